@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.base.errors import AssetError, no_package
+from aerialdojo_gen.base.errors import AssetError, first_line, no_package
 from aerialdojo_gen.imports.pictures import TEXTURE_PX, SourceMaterial, decode_surfaces
 from aerialdojo_gen.imports.raw import GREY, RawNode, empty_corners, merge_nodes
 
@@ -25,9 +25,7 @@ def read_assimp(path: Path, resolve: Callable[[str], bytes], texture_px: int = T
     try:
         scene = assimp.import_file(str(path), assimp.Process_Triangulate | assimp.Process_SortByPType)
     except (RuntimeError, ValueError, OSError) as error:
-        raise AssetError(
-            f"Assimp cannot read it ({str(error).splitlines()[0][:120] if str(error) else 'no reason'})"
-        ) from None
+        raise AssetError(f"Assimp cannot read it ({first_line(error)})") from None
     diffuse = int(assimp.TextureType_DIFFUSE)
     surfaces, index = decode_surfaces([_source_material(m, diffuse, resolve) for m in scene.materials], texture_px)
     meshes = [_mesh(mesh) for mesh in scene.meshes]

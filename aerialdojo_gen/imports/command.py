@@ -7,7 +7,7 @@ import json
 import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -92,7 +92,7 @@ def _make_tiles(
     """Cut a mesh into squares of `edge_m` metres, in one frame; yields those with content, from south-west on."""
     if not (math.isfinite(edge_m) and SMALLEST_M <= edge_m <= LARGEST_M):
         raise UsageError(f"--tiles {edge_m:g}: the edge of a tile is {SMALLEST_M:g} to {LARGEST_M:g} m")
-    low, high = source.low, source.high
+    low, high = source.bounds
     columns, rows = (max(1, math.ceil(v / edge_m - 1e-9)) for v in (high - low)[:2])
     if columns * rows > _MAX_TILES:
         raise AssetError(
@@ -105,9 +105,8 @@ def _make_tiles(
             corner = low[:2] + edge_m * np.array([column, row])
             region = Region.box(*corner, *(corner + edge_m))
             near = np.asarray((boxes[:, 0] < region.high).all(axis=1) & (boxes[:, 1] > region.low).all(axis=1))
-            part = SourceMesh(
-                [b for b, n in zip(source.bodies, near, strict=True) if n], source.domes, source.repairs
-            )
+            bodies = [b for b, n in zip(source.bodies, near, strict=True) if n]
+            part = replace(source, bodies=bodies)
             if not near.any() or not _has_content(part, region, edge_m):
                 continue
             yield region, *make_scene(_tile_name(name, column, row), part, options, region, origin)
@@ -115,10 +114,8 @@ def _make_tiles(
 
 def _tile_name(name: str, column: int, row: int) -> str:
     """Name a tile by its column from the west and its row from the south; a partition suffix stays last."""
-    for suffix in ("_0", "_1"):
-        if name.endswith(suffix):
-            return f"{name[: -len(suffix)]}-x{column}y{row}{suffix}"
-    return f"{name}-x{column}y{row}"
+    stem, suffix = (name[:-2], name[-2:]) if name.endswith(("_0", "_1")) else (name, "")
+    return f"{stem}-x{column}y{row}{suffix}"
 
 
 def _has_content(source: SourceMesh, region: Region, edge_m: float) -> bool:
@@ -127,7 +124,8 @@ def _has_content(source: SourceMesh, region: Region, edge_m: float) -> bool:
         part = source.within(region)
     except AssetError:
         return False
-    size = (part.high - part.low)[:2]
+    low, high = part.bounds
+    size = (high - low)[:2]
     return bool(size.max() >= SMALLEST_M and np.prod(size) >= _MIN_SHARE * edge_m**2)
 
 
@@ -183,8 +181,8 @@ def _annotations(path: Path, name: str) -> str:
         raise AnnotationError(f"{path} is not UTF-8: {error}") from None
     source = parse_annotations(text)
     if source.scene and source.scene != name:
-        found = brief(repr(source.scene), 60)
-        raise AnnotationError(f"{path} is of scene {found}, not of {name!r}: its key scene says so")
+        named = brief(repr(source.scene), 60)
+        raise AnnotationError(f"{path} is of scene {named}, not of {name!r}: its key scene says so")
     if source.faults:
         raise AnnotationError(f"{path}: {source.faults[0]}")
     return text

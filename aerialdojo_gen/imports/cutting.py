@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from itertools import pairwise
+from typing import Any, NamedTuple
 
 import numpy as np
 import shapely
@@ -56,15 +57,12 @@ class Region:
     @property
     def planes(self) -> list[tuple[Floats, float]]:
         """Sides as (outward normal, offset): a point p is inside if normal · p <= offset for all."""
-        out = []
-        for (x0, y0), (x1, y1) in zip(self.corners, (*self.corners[1:], self.corners[0]), strict=True):
-            normal = np.array([y1 - y0, x0 - x1]) / math.hypot(x1 - x0, y1 - y0)
-            out.append((normal, float(normal @ (x0, y0))))
-        return out
+        sides = list(pairwise((*self.corners, self.corners[0])))
+        normals = [np.array([y1 - y0, x0 - x1]) / math.hypot(x1 - x0, y1 - y0) for (x0, y0), (x1, y1) in sides]
+        return [(normal, float(normal @ start)) for normal, (start, _) in zip(normals, sides, strict=True)]
 
 
-@dataclass(frozen=True, eq=False)
-class Pieces:
+class Pieces(NamedTuple):
     """Clipped triangles."""
 
     corners: Floats  # (k, 3, 3) float64; metres
@@ -107,10 +105,8 @@ def _select(pieces: Pieces, rows: NDArray[np.bool_] | Ints) -> Pieces:
 
 
 def _concatenate(parts: Sequence[Pieces]) -> Pieces:
-    return Pieces(
-        np.concatenate([p.corners for p in parts]), np.concatenate([p.source for p in parts]),
-        np.concatenate([p.weights for p in parts]),
-    )  # fmt: skip
+    corners, source, weights = zip(*parts, strict=True)
+    return Pieces(np.concatenate(corners), np.concatenate(source), np.concatenate(weights))
 
 
 def _clip_by_plane(pieces: Pieces, body: Ints, closed: NDArray[np.bool_], normal: Floats, offset: float) -> Pieces:
@@ -181,9 +177,8 @@ def _caps(
         # Use the exact rim points, so that there are no gaps.
         ends = dict(zip(map(tuple, grid.reshape(-1, 2).tolist()), segments[rows].reshape(-1, 3), strict=True))
         keys = np.round(uz / _GRID_M).reshape(-1, 2).tolist()
-        corners = np.array(
-            [ends.get((u, z), at) for (u, z), at in zip(keys, corners.reshape(-1, 3), strict=True)]
-        ).reshape(-1, 3, 3)
+        exact = [ends.get((u, z), at) for (u, z), at in zip(keys, corners.reshape(-1, 3), strict=True)]
+        corners = np.array(exact).reshape(-1, 3, 3)
         one = np.zeros((len(uz), 3, 3))
         one[:, :, 0] = 1.0
         out.append(Pieces(corners, np.full(len(uz), source[rows].min()), one))

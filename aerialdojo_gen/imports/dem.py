@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.base.errors import AssetError, MissingPackage, UsageError, check_regular, no_package
+from aerialdojo_gen.base.errors import AssetError, MissingPackage, UsageError, check_regular, first_line, no_package
 from aerialdojo_gen.imports.earth import Bbox, format_bbox
 from aerialdojo_gen.scenes.terrain import read_ascii_grid
 
@@ -79,9 +79,8 @@ def read_dem(path: Path) -> Dem:
         raise AssetError(f"{path}: cannot be read ({error.strerror})") from None
     dem = _geotiff(path) if suffix in (".tif", ".tiff") else _ascii(path) if suffix == ".asc" else _npz(path)
     if min(dem.heights_m.shape) < 2:
-        raise AssetError(
-            f"{path}: has {' by '.join(map(str, dem.heights_m.shape))} heights, at least 2 by 2 are needed"
-        )
+        size = " by ".join(map(str, dem.heights_m.shape))
+        raise AssetError(f"{path}: has {size} heights, at least 2 by 2 are needed")
     if not np.isfinite(dem.heights_m).any():
         raise AssetError(f"{path}: contains no heights: every cell is nodata")
     return dem
@@ -104,18 +103,15 @@ def _geotiff(path: Path) -> Dem:
             z = file.read(1, masked=True).astype(np.float64).filled(np.nan)
             crs, t = file.crs, file.transform
     except rasterio.errors.RasterioError as error:
-        raise AssetError(
-            f"{path} cannot be read as a GeoTIFF, or is cut short: {_one_line(error)}; get it again"
-        ) from None
+        why = f"cannot be read as a GeoTIFF, or is cut short: {first_line(error)}"
+        raise AssetError(f"{path} {why}; get it again") from None
     if crs is None:
         raise AssetError(f"{path} has no coordinate system: set one, e.g. gdal_edit.py -a_srs EPSG:4326 {path.name}")
     if abs(t.b) > 1e-12 or abs(t.d) > 1e-12 or t.a <= 0 or t.e >= 0:
         raise AssetError(f"{path} is rotated or mirrored: north must be up (gdalwarp -t_srs EPSG:4326 fixes it)")
     if not crs.is_geographic and not math.isclose(crs.linear_units_factor[1], 1.0, rel_tol=1e-9):
-        raise AssetError(
-            f"{path} is in {crs.linear_units_factor[0]}, not in metres or degrees: "
-            "gdalwarp -t_srs EPSG:4326 makes it so"
-        )
+        wrong = f"is in {crs.linear_units_factor[0]}, not in metres or degrees"
+        raise AssetError(f"{path} {wrong}: gdalwarp -t_srs EPSG:4326 makes it so")
 
     def to_grid(lon: Floats, lat: Floats) -> tuple[Floats, Floats]:
         shape = np.shape(lon)
@@ -145,9 +141,8 @@ def _npz(path: Path) -> Dem:
     except (
         OSError, ValueError, KeyError, TypeError, EOFError, RuntimeError, zlib.error, zipfile.BadZipFile,
     ) as error:  # fmt: skip
-        raise AssetError(
-            f"{path} cannot be read: {_one_line(error)}; it must hold heights_m with cell_m or bbox_deg"
-        ) from None
+        wanted = "it must hold heights_m with cell_m or bbox_deg"
+        raise AssetError(f"{path} cannot be read: {first_line(error)}; {wanted}") from None
     if z.ndim != 2 or z.size > _MAX_CELLS or (cell is None) == (bbox is None) or min(z.shape) < 2:
         raise AssetError(
             f"{path} must hold heights_m, 2 by 2 or more, with cell_m (metres) or bbox_deg (west, south, east, north)"
@@ -172,9 +167,7 @@ def _check_npz_sizes(path: Path) -> None:
                 continue
             with archive.open(name) as file:
                 version = np.lib.format.read_magic(file)
-                read = (
-                    np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
-                )
+                read = {(1, 0): np.lib.format.read_array_header_1_0}.get(version, np.lib.format.read_array_header_2_0)
                 shape, _, dtype = read(file)
             if math.prod(shape) * dtype.itemsize > 8 * _MAX_CELLS:
                 raise ValueError(f"{name} has {math.prod(shape):,} numbers, the maximum is {_MAX_CELLS:,}")
@@ -182,10 +175,6 @@ def _check_npz_sizes(path: Path) -> None:
 
 def _identity(lon: Floats, lat: Floats) -> tuple[Floats, Floats]:
     return lon, lat
-
-
-def _one_line(error: BaseException) -> str:
-    return " ".join(str(error).split())[:160] or type(error).__name__
 
 
 def describe_coverage(dem: Dem) -> str:

@@ -99,20 +99,20 @@ def draft_scene(
     return path
 
 
-def _check_enough(name: str, found: int, expected: int, why: str, *, exact: bool) -> None:
+def _check_enough(name: str, made: int, expected: int, why: str, *, exact: bool) -> None:
     """Raise an error for an empty or incomplete draft; warn of one smaller than proposed."""
     by_hand = f"add others by hand: {command('annotate', scene=name)}"
-    if found == 0:
+    if made == 0:
         raise _nothing_to_draft(name, why)
-    if found < expected and exact:
-        fewer = f"--objects {found} takes those, or " if found >= MIN_OBJECTS else ""
+    if made < expected and exact:
+        fewer = f"--objects {made} takes those, or " if made >= MIN_OBJECTS else ""
         raise AnnotationError(
-            f"{name}: {expected} objects requested, {found} can be chosen and distinguished{why}: {fewer}{by_hand}"
+            f"{name}: {expected} objects requested, {made} can be chosen and distinguished{why}: {fewer}{by_hand}"
         )
-    if found < MIN_OBJECTS:
+    if made < MIN_OBJECTS:
         log.warning("%s: a single object makes no task%s; %s", name, why, by_hand)
-    elif found < expected:
-        log.warning("%s: %d of %d objects can be chosen and distinguished%s; %s", name, found, expected, why, by_hand)
+    elif made < expected:
+        log.warning("%s: %d of %d objects can be chosen and distinguished%s; %s", name, made, expected, why, by_hand)
 
 
 def _nothing_to_draft(name: str, why: str) -> AnnotationError:
@@ -136,12 +136,12 @@ def make_reject(scene: Scene, pipeline: Pipeline, roots: ProjectPaths) -> Callab
     def reject_reason(node: str) -> str:
         x, y, z = (float(v) for v in scene[node].centroid)
         item = {"object_id": 0, "mesh_node": node, "x_m": x, "y_m": y, "z_m": z}
-        found, rejected, _ = candidates_of(item, world, job, config)
-        seen = 0 if found is None else len(found.seeing(config.min_visible_fraction))
-        if seen >= config.shortlist:
+        candidates, rejected, _ = candidates_of(item, world, job, config)
+        visible = 0 if candidates is None else len(candidates.seeing(config.min_visible_fraction))
+        if visible >= config.shortlist:
             return ""
-        if found is not None:
-            rejected["not_visible"] += len(found.positions_m) - seen
+        if candidates is not None:
+            rejected["not_visible"] += len(candidates.positions_m) - visible
         cause = max(_CAUSES, key=lambda reason: rejected[reason])
         return f"without {config.shortlist} viewpoints at {config.standoff_m:g} m ({_CAUSES[cause]})"
 

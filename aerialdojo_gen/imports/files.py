@@ -8,29 +8,25 @@ from __future__ import annotations
 
 import json
 import re
-import struct
 import warnings
 from collections import defaultdict
-from collections.abc import Mapping
-from dataclasses import fields
+from collections.abc import Mapping, Sequence
+from dataclasses import fields, replace
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 
 from aerialdojo_gen.base.environment_errors import is_out_of_memory
 from aerialdojo_gen.base.errors import AssetError, check_regular
-from aerialdojo_gen.base.safe_parse import loads_json
-from aerialdojo_gen.imports.gltf import read_gltf
-from aerialdojo_gen.imports.mesh_materials import add_materials
-from aerialdojo_gen.imports.pictures import TEXTURE_PX
-from aerialdojo_gen.imports.raw import RawNode, RawSurface, default_colours, merge_nodes
+from aerialdojo_gen.imports.gltf import MAX_TRIANGLES, read_gltf
+from aerialdojo_gen.imports.pictures import TEXTURE_PX, SourceMaterial, decode_surfaces
+from aerialdojo_gen.imports.raw import RawNode, RawSurface, default_colours, empty_corners, merge_nodes
 from aerialdojo_gen.imports.untrusted import MAX_MEMORY_BYTES, SiblingFiles, exit_status, mismatch, read_in_sandbox
 from aerialdojo_gen.store.staging import scratch_folder
 
 SUFFIXES = (".glb", ".gltf", ".obj", ".stl", ".ply", ".3ds", ".dae", ".fbx")
 MAX_FILE_BYTES = 1 << 30
-MAX_TRIANGLES = 4_000_000
 
 
 def read_mesh(path: Path, max_memory_bytes: int = MAX_MEMORY_BYTES, texture_px: int = TEXTURE_PX) -> list[RawNode]:
@@ -44,9 +40,8 @@ def read_mesh(path: Path, max_memory_bytes: int = MAX_MEMORY_BYTES, texture_px: 
     except OSError as error:
         raise AssetError(f"{path}: {error.strerror}") from None
     if size > MAX_FILE_BYTES:
-        raise AssetError(
-            f"{path}: {size >> 20} MiB, the maximum is {MAX_FILE_BYTES >> 20}: simplify or split the mesh"
-        )
+        most = f"the maximum is {MAX_FILE_BYTES >> 20}: simplify or split the mesh"
+        raise AssetError(f"{path}: {size >> 20} MiB, {most}")
     if fault:
         raise AssetError(f"{path}: {fault}")
     with scratch_folder() as folder:
@@ -85,8 +80,7 @@ def _read(path: Path, texture_px: int) -> list[RawNode]:
 
         return read_3ds(path.read_bytes())
     if suffix in (".glb", ".gltf"):
-        check_glb(path)
-        return read_gltf(path.read_bytes(), SiblingFiles(path).get, texture_px)
+        return read_gltf(path.read_bytes(), suffix[1:].upper(), SiblingFiles(path).get, texture_px)
     if suffix in (".dae", ".fbx"):
         from aerialdojo_gen.imports.assimp import read_assimp
 
@@ -111,7 +105,7 @@ def _read(path: Path, texture_px: int) -> list[RawNode]:
             shown.append(body)
             nodes.append(RawNode(label, vertices, faces, default_colours(len(faces))))
     several: dict[str, list[RawNode]] = {}
-    for node in add_materials(nodes, shown, siblings, texture_px):
+    for node in _add_materials(nodes, shown, siblings, texture_px):
         several.setdefault(node.name, []).append(node)
     return [bodies[0] if len(bodies) == 1 else merge_nodes(name, bodies) for name, bodies in several.items()]
 
@@ -138,44 +132,85 @@ def _object_of(name: str, named: Mapping[str, str], path: Path) -> str:
     return named.get(name, other)
 
 
-def check_glb(path: Path) -> None:
-    """Refuse a GLB or glTF file whose arrays would be far larger than the file, before any of them is made."""
-    # An accessor without a buffer view costs the file nothing, and several nodes may show one mesh.
-    with path.open("rb") as file:
-        text = file.read(MAX_FILE_BYTES // 4) if path.suffix.lower() == ".gltf" else _glb_json(file)
-        try:
-            document = loads_json(text, finite=False)
-            accessors = document.get("accessors", [])
-            counts = [int(a["count"]) for a in accessors]
-            shown = sum(
-                (counts[p["indices"]] if "indices" in p else counts[p["attributes"]["POSITION"]]) // 3
-                for node in document.get("nodes", [])
-                if "mesh" in node
-                for p in document["meshes"][node["mesh"]]["primitives"]
-            )
-        except (ValueError, KeyError, IndexError, TypeError, AttributeError) as error:
-            raise AssetError(f"is a damaged {path.suffix[1:].upper()} file") from error
-    if min(counts, default=0) < 0:
-        raise AssetError(f"is a damaged {path.suffix[1:].upper()} file: an array of {min(counts):,} numbers")
-    if sum(counts) > 6 * MAX_TRIANGLES or shown > MAX_TRIANGLES:
-        raise AssetError(
-            f"asks for {max(shown, sum(counts) // 3):,} triangles, the maximum is {MAX_TRIANGLES:,}: "
-            "simplify or split the mesh"
-        )
-    required = set(document.get("extensionsRequired", []))
-    packed = required & {"KHR_draco_mesh_compression", "EXT_meshopt_compression"}
-    if packed:
-        raise AssetError(f"is compressed ({', '.join(sorted(packed))}): export it without compression")
+def _add_materials(
+    nodes: Sequence[RawNode], bodies: Sequence[Any], siblings: SiblingFiles, texture_px: int
+) -> list[RawNode]:
+    """Give nodes the materials of the meshes of one file."""
+    materials: dict[int, Any] = {}
+    for body in bodies:
+        material = getattr(body.visual, "material", None)
+        if material is not None and body.visual.kind not in ("face", "vertex"):
+            materials[id(material)] = material
+    missing = tuple(
+        RawSurface(notes=(f"{name} is missing: drawn in grey or in vertex colours",))
+        for name in siblings.missing
+        if name.lower().endswith(".mtl") or not materials
+    )
+    maps = _maps(siblings)
+    surfaces, index = decode_surfaces([_source_material(m, maps, siblings) for m in materials.values()], texture_px)
+    surfaces += missing
+    place = dict(zip(materials, index, strict=True))
+    return [_paint(node, body, place, surfaces) for node, body in zip(nodes, bodies, strict=True)]
 
 
-def _glb_json(file: BinaryIO) -> bytes:
-    head = file.read(20)
-    if len(head) < 20 or head[:4] != b"glTF":
-        raise AssetError("is not a GLB file")
-    version, _, length, kind = struct.unpack("<IIII", head[4:])
-    if version != 2 or kind != 0x4E4F534A or length > MAX_FILE_BYTES // 4:
-        raise AssetError("is not a GLB 2 file")
-    return file.read(length)
+def _paint(node: RawNode, body: Any, place: dict[int, int], surfaces: tuple[RawSurface, ...]) -> RawNode:
+    n, visual, node = len(body.faces), body.visual, replace(node, surfaces=surfaces)
+    painted = {"face": n, "vertex": len(body.vertices)}.get(visual.kind)
+    if painted is not None and len(getattr(visual, f"{visual.kind}_colors")) != painted:
+        # A damaged file, or one whose polygons were cut into triangles without their colours.
+        note = f"its colours do not match its {'faces' if visual.kind == 'face' else 'vertices'}: drawn in grey"
+        return replace(node, surfaces=(*surfaces, RawSurface(notes=(note,))))
+    if visual.kind == "face":
+        return replace(node, colours=np.asarray(visual.face_colors[:, :3], dtype=np.uint8))
+    corners = empty_corners(n)
+    if visual.kind == "vertex":
+        own = np.asarray(visual.vertex_colors[:, :3], dtype=np.float32)[body.faces]
+        corners[..., 2:] = own
+        return replace(node, colours=np.rint(own.mean(axis=1)).astype(np.uint8), corners=corners)
+    material = getattr(visual, "material", None)
+    if material is None:
+        return node
+    k = place[id(material)]
+    uv = getattr(visual, "uv", None)
+    if uv is not None and len(uv) == len(body.vertices) and surfaces[k].texture is not None:
+        corners[..., :2] = np.nan_to_num(np.asarray(uv, dtype=np.float32)[:, :2])[body.faces]
+    colours = np.tile(np.array(surfaces[k].colour, dtype=np.uint8), (n, 1))
+    return replace(node, colours=colours, surface=np.full(n, k, dtype=np.int32), corners=corners)
+
+
+def _source_material(material: Any, maps: dict[str, dict[str, str]], siblings: SiblingFiles) -> SourceMaterial:
+    """Convert a material of an MTL file, or of a PLY with a texture."""
+    name = str(getattr(material, "name", "") or "")
+    textures = maps.get(name, {})
+    file, missing = _read_texture(textures.get("map_kd", ""), siblings)
+    if getattr(material, "image", None) is not None and not textures:
+        file = next(iter(siblings.loaded.values()), None)
+    mask, _ = _read_texture(textures.get("map_d", ""), siblings)
+    red, green, blue = (float(c) / 255.0 for c in np.asarray(material.main_color)[:3])
+    # Writers leave arbitrary colours next to a texture, and few programs multiply by them.
+    factor = (1.0, 1.0, 1.0) if file is not None else (red, green, blue)
+    return SourceMaterial(name, factor, file, missing, alpha="blend" if mask is None else "mask", mask=mask)
+
+
+def _maps(siblings: SiblingFiles) -> dict[str, dict[str, str]]:
+    """Read the texture files of each material from the MTL files."""
+    out: dict[str, dict[str, str]] = {}
+    for name, data in list(siblings.loaded.items()):
+        own: dict[str, str] = {}
+        for line in data.decode("utf-8", "replace").splitlines() if name.lower().endswith(".mtl") else ():
+            key, _, rest = line.strip().partition(" ")
+            if key.lower() == "newmtl":
+                own = out[" ".join(rest.split())] = {}
+            elif key.lower() in ("map_kd", "map_d"):
+                own[key.lower()] = rest.strip()
+    return out
+
+
+def _read_texture(name: str, siblings: SiblingFiles) -> tuple[bytes | None, str]:
+    try:
+        return (siblings.get(name) if name else None), ""
+    except FileNotFoundError:
+        return None, name[-80:]
 
 
 def _pack(nodes: list[RawNode], out: Path) -> None:

@@ -78,13 +78,8 @@ def size_words(sizes_m: Sequence[NDArray[np.float64]]) -> list[str]:
     middle = np.median(extents, axis=0) if len(extents) > 1 else extents[0]
     whole = np.linalg.norm(extents, axis=1) / max(float(np.linalg.norm(middle)), 1e-9)
     height = extents[:, 2] / max(float(middle[2]), 1e-9)
-    words = []
-    for w, h in zip(whole.tolist(), height.tolist(), strict=True):
-        if h > _NOTABLY or h < 1 / _NOTABLY:
-            words.append("tall" if h > 1 else "low")
-        else:
-            words.append("large" if w > _LARGER else "small" if w < 1 / _LARGER else "")
-    return words
+    differs = [height > _NOTABLY, height < 1 / _NOTABLY, whole > _LARGER, whole < 1 / _LARGER]
+    return [str(word) for word in np.select(differs, ["tall", "low", "large", "small"], "")]
 
 
 def colour_of(parts: Sequence[Part], materials: Mapping[str, Material], said: str) -> str:

@@ -26,19 +26,21 @@ Resolve = Callable[[str], bytes]
 _DTYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
+MAX_TRIANGLES = 4_000_000
+_MAX_JSON_BYTES = 1 << 28
 # Writers that store sRGB in vertex colours, which should be linear.
 _SRGB_WRITERS = ("trimesh", "meshlab", "open3d")
 
 
-def read_gltf(raw: bytes, resolve: Resolve, texture_px: int = TEXTURE_PX) -> list[RawNode]:
-    """Read glTF bytes: one RawNode per mesh node, transforms applied."""
-    return _File(raw, resolve, texture_px).nodes()
+def read_gltf(raw: bytes, kind: str, resolve: Resolve, texture_px: int = TEXTURE_PX) -> list[RawNode]:
+    """Read the bytes of a file, ``"GLB"`` or ``"GLTF"``: one RawNode per mesh node, transforms applied."""
+    return _File(raw, kind, resolve, texture_px).nodes()
 
 
 class _File:
-    def __init__(self, raw: bytes, resolve: Resolve, texture_px: int) -> None:
+    def __init__(self, raw: bytes, kind: str, resolve: Resolve, texture_px: int) -> None:
         self._resolve = resolve
-        self._document, self._own = _parse(raw)
+        self._document, self._own = _parse(raw, kind)
         self._buffers: dict[int, memoryview] = {}
         writer = str(self._document.get("asset", {}).get("generator", "")).lower()
         self._srgb_colours = any(word in writer for word in _SRGB_WRITERS)
@@ -68,12 +70,12 @@ class _File:
         else:
             children = {c for n in nodes for c in n.get("children", ())}
             roots = [k for k in range(len(nodes)) if k not in children]
-        stack, seen = [(int(k), np.eye(4)) for k in reversed(roots)], set()
+        stack, visited = [(int(k), np.eye(4)) for k in reversed(roots)], set()
         while stack:
             k, parent = stack.pop()
-            if k in seen or not 0 <= k < len(nodes):
+            if k in visited or not 0 <= k < len(nodes):
                 continue
-            seen.add(k)
+            visited.add(k)
             world = parent @ _local(nodes[k])
             yield k, world
             stack += [(int(child), world) for child in reversed(nodes[k].get("children", ()))]
@@ -170,10 +172,10 @@ class _File:
         entry = self._document["textures"][texture]
         source = entry.get("source")
         if source is None:
-            found = [e["source"] for e in entry.get("extensions", {}).values() if "source" in e]
-            if not found:
+            sources = [e["source"] for e in entry.get("extensions", {}).values() if "source" in e]
+            if not sources:
                 return None, "without an image"
-            source = found[0]
+            source = sources[0]
         image = self._document["images"][source]
         if "bufferView" in image:
             return bytes(self._view(image["bufferView"])), ""
@@ -192,9 +194,8 @@ class _File:
         """Return the first `width` numbers of an attribute of `n` vertices."""
         values = self._array(attributes[name])
         if values.shape[1] < width or (n is not None and len(values) != n):
-            raise AssetError(
-                f"is a damaged glTF file: {name} has {values.shape[1]} numbers for {len(values)} vertices"
-            )
+            has = f"{values.shape[1]} numbers for {len(values)} vertices"
+            raise AssetError(f"is a damaged glTF file: {name} has {has}")
         return values[:, :width].astype(np.float64)
 
     def _array(self, accessor: int) -> NDArray[Any]:
@@ -249,18 +250,40 @@ class _File:
         return self._buffers[k]
 
 
-def _parse(raw: bytes) -> tuple[dict[str, Any], memoryview]:
-    if raw[:4] != b"glTF":
-        document = loads_json(raw, finite=False)
-        if not isinstance(document, dict):
-            raise AssetError("is not a glTF file")
-        return document, memoryview(b"")
-    (length,) = struct.unpack_from("<I", raw, 12)
-    document = loads_json(raw[20 : 20 + length], finite=False)
-    rest = memoryview(raw)[20 + length :]
-    if len(rest) < 8:
-        return document, memoryview(b"")
-    (size,) = struct.unpack_from("<I", rest, 0)
+def _parse(raw: bytes, kind: str) -> tuple[dict[str, Any], memoryview]:
+    """Return the document and the own data of a file; one whose arrays would be far larger than it is refused."""
+    text, rest = memoryview(raw), memoryview(b"")
+    if kind == "GLB":
+        if len(raw) < 20 or raw[:4] != b"glTF":
+            raise AssetError("is not a GLB file")
+        version, _, length, chunk = struct.unpack_from("<IIII", raw, 4)
+        if version != 2 or chunk != 0x4E4F534A or length > _MAX_JSON_BYTES:
+            raise AssetError("is not a GLB 2 file")
+        text, rest = text[20 : 20 + length], text[20 + length :]
+    try:
+        document = loads_json(bytes(text[:_MAX_JSON_BYTES]), finite=False)
+        accessors = document.get("accessors", [])
+        counts = [int(a["count"]) for a in accessors]
+        # An accessor without a buffer view costs the file nothing, and several nodes may show one mesh.
+        shown = sum(
+            (counts[p["indices"]] if "indices" in p else counts[p["attributes"]["POSITION"]]) // 3
+            for node in document.get("nodes", [])
+            if "mesh" in node
+            for p in document["meshes"][node["mesh"]]["primitives"]
+        )
+    except (ValueError, KeyError, IndexError, TypeError, AttributeError) as error:
+        raise AssetError(f"is a damaged {kind} file") from error
+    if min(counts, default=0) < 0:
+        raise AssetError(f"is a damaged {kind} file: an array of {min(counts):,} numbers")
+    if sum(counts) > 6 * MAX_TRIANGLES or shown > MAX_TRIANGLES:
+        raise AssetError(
+            f"asks for {max(shown, sum(counts) // 3):,} triangles, the maximum is {MAX_TRIANGLES:,}: "
+            "simplify or split the mesh"
+        )
+    packed = {"KHR_draco_mesh_compression", "EXT_meshopt_compression"} & {*document.get("extensionsRequired", ())}
+    if packed:
+        raise AssetError(f"is compressed ({', '.join(sorted(packed))}): export it without compression")
+    size = struct.unpack_from("<I", rest)[0] if len(rest) >= 8 else 0
     return document, rest[8 : 8 + size]
 
 

@@ -17,7 +17,7 @@ from aerialdojo_gen.imports.forms import colour_of, form_of, grown, is_unnamed, 
 from aerialdojo_gen.imports.material_builder import LIGHTS, MaterialBuilder, is_photographic
 from aerialdojo_gen.imports.naming import Naming, word_list
 from aerialdojo_gen.imports.pictures import TEXTURE_PX
-from aerialdojo_gen.imports.raw import RawNode, merge_nodes, sort_by_position
+from aerialdojo_gen.imports.raw import RawNode, bounds_of, merge_nodes, sort_by_position
 from aerialdojo_gen.imports.split_components import split_components
 from aerialdojo_gen.imports.surfaces import (
     SKY,
@@ -89,15 +89,11 @@ class MeshOptions:
             raise UsageError("--crop and --box are mutually exclusive")
         if not all(math.isfinite(v) and abs(v) < 1e7 for v in crop_m or box_m or ()):
             raise UsageError("--crop and --box take finite numbers of metres")
-        if crop_m is not None:
-            if crop_m[2] <= 0:
-                raise UsageError(f"--crop {crop_m[0]:g} {crop_m[1]:g} {crop_m[2]:g}: the radius must be above 0")
-            return Region.circle(*crop_m)
-        if box_m is None:
-            return None
-        if box_m[0] == box_m[2] or box_m[1] == box_m[3]:
+        if crop_m is not None and crop_m[2] <= 0:
+            raise UsageError(f"--crop {crop_m[0]:g} {crop_m[1]:g} {crop_m[2]:g}: the radius must be above 0")
+        if box_m is not None and (box_m[0] == box_m[2] or box_m[1] == box_m[3]):
             raise UsageError("--box X0 Y0 X1 Y1: the two corners must differ in x and in y")
-        return Region.box(*box_m)
+        return Region.circle(*crop_m) if crop_m else Region.box(*box_m) if box_m else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,14 +121,9 @@ class SourceMesh:
         return cls(rest, [bodies[k] for k in domes], repairs)
 
     @property
-    def low(self) -> Floats:
-        """Lower corner of the bodies, (3,) float64, metres."""
-        return _bounds(self.bodies)[0]
-
-    @property
-    def high(self) -> Floats:
-        """Upper corner, (3,) float64, metres."""
-        return _bounds(self.bodies)[1]
+    def bounds(self) -> tuple[Floats, Floats]:
+        """Lower and upper corner of the bodies, (3,) float64 each, metres."""
+        return bounds_of(self.bodies)
 
     def within(self, region: Region) -> SourceMesh:
         """Clip to a region; AssetError if nothing is left."""
@@ -145,7 +136,7 @@ class SourceMesh:
 
 def describe_extent(bodies: Sequence[RawNode]) -> str:
     """Describe the x and y ranges of bodies, and where most triangles are."""
-    low, high = _bounds(bodies)
+    low, high = bounds_of(bodies)
     middles = np.concatenate([b.vertices[b.faces].mean(axis=1)[:, :2] for b in bodies])
     cell = max(float((high - low)[:2].max()) / 10, 1e-9)
     places, n = np.unique(np.floor((middles - low[:2]) / cell).astype(np.int64), axis=0, return_counts=True)
@@ -179,35 +170,29 @@ def make_scene(
     name: str, source: SourceMesh, options: MeshOptions, region: Region | None, origin_m: Floats | None = None
 ) -> tuple[Scene, Repairs]:
     """Make a scene of a mesh, or of the part in `region`; returns the scene and repairs."""
-    light = options.light
     repairs = Repairs(list(source.repairs.lines))
     part = source if region is None else source.within(region)
-    bodies = part.bodies
-    low, high = part.low, part.high
-    _check_extent(high - low, bodies)
-    bodies, split_stats = split_components(bodies)
+    low, high = part.bounds
+    _check_extent(high - low, part.bodies)
+    bodies, split_stats = split_components(part.bodies)
     repairs.lines += split_stats.lines()
     shift = np.array([(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2]]) if origin_m is None else origin_m
     repairs.origin_m = (float(shift[0]), float(shift[1]), float(shift[2]))
     bodies = _merged_clutter(_translate(sort_by_position(bodies), -shift))
     domes = _translate(part.domes, -shift)
-    builder = MaterialBuilder(light == "baked" or (light == "auto" and is_photographic(bodies)))
+    builder = MaterialBuilder(options.light == "baked" or (options.light == "auto" and is_photographic(bodies)))
     builder.measure_texture_scales([*bodies, *domes])
     parts = builder.materials
     built = [(b, made) for b in bodies for made in [_parts(b, builder, repairs)] if made]
     instances = _make_instances(built, options.naming, parts)
     if not instances:
         raise AssetError("no triangles are left after repair: the mesh is empty or degenerate")
-    instances = [
-        replace(instance, surface="solid" if connected_bodies(body.faces, len(body.vertices))[1].all() else "sheet")
-        for instance, (body, _) in zip(instances, built, strict=True)
-    ]
     source_names = {instance.node: body.name for instance, (body, _) in zip(instances, built, strict=True)}
     backdrop = tuple(
         Instance(f"{SKY}_{k:04d}", SKY, "", {}, _parts(dome, builder, Repairs()), surface="dome")
         for k, dome in enumerate(domes)
     )
-    _report_textures([*bodies, *domes], builder, light, repairs)
+    _report_textures([*bodies, *domes], builder, options.light, repairs)
     low, high = low - shift, high - shift
     cover = ground_cover(instances, low, high)
     if cover < _GROUND_COVER:
@@ -216,22 +201,19 @@ def make_scene(
     top = options.ceiling_m
     if top is None:
         top = max(float(high[2]) + _HEADROOM_M, float(low[2]) + _LOWEST_CEILING_M)
-    bounds = np.array(
-        [[low[0] - _MARGIN_M, low[1] - _MARGIN_M, low[2]], [high[0] + _MARGIN_M, high[1] + _MARGIN_M, top]]
-    )
+    bounds = np.array([[*(low[:2] - _MARGIN_M), low[2]], [*(high[:2] + _MARGIN_M), top]])
     if region is not None:
         # Bodies cut open at the border are closed by the end of the flight volume.
         bounds[0, :2] = np.maximum(bounds[0, :2], region.low - shift[:2])
         bounds[1, :2] = np.minimum(bounds[1, :2], region.high - shift[:2])
-    scene = classify_surfaces(
-        Scene(name, tuple(instances), parts, bounds, imported=True, backdrop=backdrop), source_names
-    )
+    scene = Scene(name, tuple(instances), parts, bounds, imported=True, backdrop=backdrop)
+    scene = classify_surfaces(scene, source_names)
     repairs.lines += describe_surfaces(scene)
     things = [i for i in scene.instances if i.category not in NON_OBJECTS]
     if things and all(is_unnamed(i.node, i.category) for i in things):
         repairs.lines.append(
-            "no thing has a name, all are told by colour and form: name them by a table of patterns of nodes or "
-            "materials (--names names.csv), or on the page of annotate"
+            "no thing has a name, all are identified by colour and form: name them by a table of patterns of nodes "
+            "or materials (--names names.csv), or on the page of annotate"
         )
     return replace(scene, imported=False), repairs
 
@@ -242,9 +224,7 @@ def _translate(bodies: Sequence[RawNode], by_m: Floats) -> list[RawNode]:
 
 def _reorient(node: RawNode, options: MeshOptions) -> RawNode:
     v = node.vertices * options.scale
-    if options.up == "y":
-        v = np.column_stack([v[:, 0], -v[:, 2], v[:, 1]])
-    return node.with_vertices(v)
+    return node.with_vertices(np.column_stack([v[:, 0], -v[:, 2], v[:, 1]]) if options.up == "y" else v)
 
 
 def _repair(node: RawNode, repairs: Repairs) -> RawNode:
@@ -265,12 +245,6 @@ def _repair(node: RawNode, repairs: Repairs) -> RawNode:
     solid = areas(vertices, faces.astype(np.int32)) > _MIN_AREA_M2 if len(faces) else np.zeros(0, dtype=bool)
     repairs.add(int((~solid).sum()), f"triangles of {node.name or 'the mesh'} without area dropped")
     return node.with_vertices(vertices, faces).select_faces(solid)
-
-
-def _bounds(bodies: Sequence[RawNode]) -> tuple[Floats, Floats]:
-    low = np.min([b.vertices.min(axis=0) for b in bodies], axis=0)
-    high = np.max([b.vertices.max(axis=0) for b in bodies], axis=0)
-    return low, high
 
 
 def _check_extent(size: Floats, bodies: Sequence[RawNode]) -> None:
@@ -330,7 +304,9 @@ def _make_instances(
     bodies: Sequence[tuple[RawNode, tuple[Part, ...]]], naming: Naming, materials: dict[str, Material]
 ) -> list[Instance]:
     """Give each body a node name, a category, and attributes of colour, size and material."""
-    least, most = _bounds([body for body, _ in bodies]) if bodies else (np.zeros(3), np.zeros(3))
+    if not bodies:
+        return []
+    least, most = bounds_of([body for body, _ in bodies])
     names = [naming.name_of(body.name, material_shares(body)) for body, _ in bodies]
     colours = [
         colour_of(parts, materials, name.attributes.get("colour", ""))
@@ -349,14 +325,19 @@ def _make_instances(
             words[k] = word
     counts: dict[str, int] = {}
     out = []
-    for (_, parts), name, category, colour, word in zip(bodies, names, categories, colours, words, strict=True):
+    for (body, parts), name, category, colour, word in zip(bodies, names, categories, colours, words, strict=True):
         # A thing without a name has its form for a category, and no number of its own.
         stem = category if name.category or category not in word_list("forms") else UNKNOWN
         k = counts[stem] = counts.get(stem, -1) + 1
         attributes = {"size": word, **name.attributes, "colour": colour}
         attributes = {key: value for key, value in attributes.items() if value}
-        out.append(Instance(f"{stem}_{k:04d}", category, "", attributes, parts))
+        surface = "solid" if _is_closed(body) else "sheet"
+        out.append(Instance(f"{stem}_{k:04d}", category, "", attributes, parts, surface=surface))
     return out
+
+
+def _is_closed(body: RawNode) -> bool:
+    return bool(connected_bodies(body.faces, len(body.vertices))[1].all())
 
 
 def _is_terrain(body: RawNode, extent: Floats) -> bool:
@@ -366,7 +347,7 @@ def _is_terrain(body: RawNode, extent: Floats) -> bool:
         return False
     normal = body.normals
     level = np.abs(normal[:, 2]).sum() >= _LEVEL_SHARE * np.linalg.norm(normal, axis=1).sum()
-    return bool(level) and not connected_bodies(body.faces, len(body.vertices))[1].all()
+    return bool(level) and not _is_closed(body)
 
 
 def _category(body: RawNode) -> str:

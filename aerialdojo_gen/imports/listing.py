@@ -33,7 +33,7 @@ class FileAxes:
 
     up: str  # The axis along which more surface is level
     up_sure: bool  # Whether the difference is large
-    units: tuple[tuple[float, str], ...]  # tuple of (float, str)
+    units: tuple[tuple[float, str], ...]  # Metres per unit, and its name; likeliest first
 
 
 def infer_axes(nodes: Sequence[RawNode]) -> FileAxes:
@@ -41,24 +41,21 @@ def infer_axes(nodes: Sequence[RawNode]) -> FileAxes:
     level = np.zeros(3)
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     for node in nodes:
-        corners = node.vertices[node.faces]
-        corners = corners[np.isfinite(corners).all(axis=(1, 2))]
-        if not len(corners):
+        finite = node.select_faces(np.asarray(np.isfinite(node.vertices[node.faces]).all(axis=(1, 2))))
+        if not len(finite.faces):
             continue
-        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        area = np.linalg.norm(normal, axis=1)
-        for k in range(3):
-            # Hills are only partly level: use the projected area.
-            steep = np.abs(normal[:, k]) < 0.3 * area
-            level[k] += np.abs(normal[~steep, k]).sum()
+        corners, normal = finite.vertices[finite.faces], np.abs(finite.normals)
+        # Hills are only partly level: use the projected area.
+        steep = normal < 0.3 * np.linalg.norm(normal, axis=1, keepdims=True)
+        level += np.where(steep, 0.0, normal).sum(axis=0)
         low, high = np.minimum(low, corners.min(axis=(0, 1))), np.maximum(high, corners.max(axis=(0, 1)))
     size = np.where(np.isfinite(high - low), high - low, 0.0)
     # Scenes are wider than high: prefer the shorter axis.
     weight = [level[k] / max(float(size[k]), 1e-9) ** 0.5 for k in (1, 2)]
     up = "y" if weight[0] > weight[1] else "z"
     sure = max(weight) >= _SURE * min(weight)
-    tall = float(size[1] if up == "y" else size[2])
-    wide = float(max(size[0], size[2] if up == "y" else size[1]))
+    other, tall = (size[2], size[1]) if up == "y" else (size[1], size[2])
+    wide = max(size[0], other)
     fit = tuple(
         (scale, unit)
         for scale, unit in _UNITS
@@ -92,7 +89,7 @@ def describe_mesh(
     bodies = [(b, *connected_bodies(b.faces, len(b.vertices))) for b in source.bodies]
     pieces = sum(int(label.max()) + 1 for _, label, _ in bodies)
     colours = len(np.unique(np.concatenate([b.colours for b in source.bodies]) // 16, axis=0))
-    low, high = source.low, source.high
+    low, high = source.bounds
     sure = "" if inferred.up_sure else ", not by much: look at it in a viewer"
     lines = [
         f"{len(nodes):,} node{'s' * (len(nodes) != 1)} with {triangles:,} triangle{'s' * (triangles != 1)} in "
@@ -109,9 +106,8 @@ def describe_mesh(
         f"heights: z is {low[2]:.7g} to {high[2]:.7g} m",
     ]
     if max(high - low) > LARGEST_M:
-        lines.append(
-            f"wider than {LARGEST_M:g} m: --tiles 200 makes scenes of its parts, --crop or --box one of a part"
-        )
+        parts = "--tiles 200 makes scenes of its parts, --crop or --box one of a part"
+        lines.append(f"wider than {LARGEST_M:g} m: {parts}")
     lines += [f"dome: {d.name or 'a node without a name'}, {len(d.faces):,} triangles" for d in source.domes]
     lines += [f"note: {line}" for line in source.repairs.lines]
     largest = sorted(bodies, key=lambda row: -float(areas(row[0].vertices, row[0].faces.astype(np.int32)).sum()))
@@ -125,6 +121,4 @@ def describe_mesh(
     heads = [Column("called", words=True), *map(Column, ("triangles", "pieces", "closed", "x, m", "y, m", "z, m"))]
     lines += ["", *TextTable("node", heads, rows).lines(width)]
     rest = len(largest) - _SHOWN
-    if rest > 0:
-        lines.append(f"and {rest:,} smaller node{'s' if rest > 1 else ''}")
-    return lines
+    return lines + ([f"and {rest:,} smaller node{'s' if rest > 1 else ''}"] if rest > 0 else [])

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+import shapely
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from shapely.geometry import LineString, Point, Polygon
@@ -216,8 +217,7 @@ def _build_bridge(
         room[side] = min(sum(LineString(p).length for _, p in run) for run in runs[side])
     ramp = [min(r, rise / usual, _MAX_RAMP_M) for r in room]
     axis = _axis(core, runs, ramp, kind)
-    start = axis.project(Point(core.coords[0]))
-    end = axis.project(Point(core.coords[-1]))
+    start, end = (axis.project(Point(core.coords[k])) for k in (0, -1))
     at = np.linspace(0.0, axis.length, max(round(axis.length / _STATION_M), 4) + 1)
     climbs = [1e9 if beyond[0] else 0.0, 1e9 if beyond[1] else 0.0]
     grade = usual
@@ -259,13 +259,11 @@ def _required_rises(
         if _is_bridge(f.tags) and _layer(f.tags) >= _layer(members[0].tags):
             continue
         half = (metres(f.tags, "width") or {"rail": 4.0, "road": 7.0, "path": 2.5}[below]) / 2
-        for p in getattr(f.shape.intersection(core), "geoms", [f.shape.intersection(core)]):
+        carried = [b for b in lower if any(f is m for m in b.members)]
+        for p in shapely.get_parts(f.shape.intersection(core)):
             s = core.project(p.representative_point())
             if 1.0 < s < core.length - 1.0:
-                over = max(
-                    (b.height(*core.interpolate(s).coords[0]) for b in lower if any(f is m for m in b.members)),
-                    default=0.0,
-                )
+                over = max((b.height(*core.interpolate(s).coords[0]) for b in carried), default=0.0)
                 for t in (s - half, s + half):
                     need(min(max(t, 0.0), core.length), _CLEAR_M[below], over)
     wet = any(f.shape.intersects(core) for f in (*areas, *lines)
@@ -317,19 +315,16 @@ def _smooth(at: Any, heights: Any, beyond: Sequence[bool]) -> Any:
     for end, free in ((0, beyond[0]), (-1, beyond[1])):
         if not free:
             # Linear from the first full window of the average to the end.
-            inner = np.flatnonzero(at - at[0] >= _ROUND_M / 2)[0] if end == 0 else np.flatnonzero(
-                at[-1] - at >= _ROUND_M / 2)[-1]  # fmt: skip
-            rows = slice(0, inner + 1) if end == 0 else slice(inner, len(at))
-            away = np.abs(at[rows] - at[end])
-            out[rows] = np.interp(away, [0.0, abs(at[inner] - at[end])], [0.0, out[inner]])
+            away = np.abs(at - at[end])
+            reach = away[away >= _ROUND_M / 2].min()
+            rows = away <= reach
+            out[rows] = np.interp(away[rows], [0.0, reach], [0.0, out[away == reach][0]])
     return out
 
 
 def _level(bridge: Bridge, ground: Ground) -> bool:
     """Whether the ground follows the deck, so that there is nothing to bridge."""
     a, b = (ground(*bridge.axis.coords[k][:2]) for k in (0, -1))
-    for share in np.linspace(0.0, 1.0, 9):
-        p = bridge.axis.interpolate(share, normalized=True)
-        if a + (b - a) * share - ground(p.x, p.y) > 1.0:
-            return False
-    return True
+    shares = np.linspace(0.0, 1.0, 9)
+    points = [bridge.axis.interpolate(share, normalized=True) for share in shares]
+    return all(a + (b - a) * f - ground(p.x, p.y) <= 1.0 for f, p in zip(shares, points, strict=True))

@@ -53,10 +53,10 @@ def plans_of(shape: BaseGeometry, tolerance_m: float, summary: Counter[str]) -> 
     return out
 
 
-def rings_of(plan: Polygon) -> dict[str, Any]:
-    """Return the keys of an area: `outline`, and `holes` if any."""
+def area_of(plan: Polygon) -> dict[str, Any]:
+    """Return an area as plans write it."""
     outline, *holes = ([list(at) for at in ring.coords[:-1]] for ring in (plan.exterior, *plan.interiors))
-    return {"outline": outline, **({"holes": holes} if holes else {})}
+    return {"polygon": outline, **({"minus": [{"polygon": hole} for hole in holes]} if holes else {})}
 
 
 def _to_centimetres(plan: Polygon) -> Polygon:
@@ -93,9 +93,8 @@ def buildings(
         rest = plan.difference(shapely.union_all([p.shape for p in own])) if own else plan
         if not own or rest.area > (1.0 - _PARTED) * area.shape.area:
             bodies += _bodies(rest, area, usual, site, summary)
-        if not bodies:
-            continue
-        out.append((area.key, _building(area, bodies, shop_points)))
+        if bodies:
+            out.append((area.key, _building(area, bodies, shop_points)))
     summary["buildings"] += len(out)
     return [made for _, made in sorted(out, key=lambda item: item[0])]
 
@@ -109,10 +108,9 @@ def _inherited(whole: Feature, part: Feature) -> Feature:
 
 def category(tags: Tags) -> str:
     """Return the category of a building, by its kind or its use."""
-    for key in ("building", "amenity", "tourism", "shop", "office", "building:use"):
-        value = tags.get(key, "")
-        if value in _CATEGORY:
-            return _CATEGORY[value]
+    keys = ("building", "amenity", "tourism", "shop", "office", "building:use")
+    if categories := [_CATEGORY[tags[key]] for key in keys if tags.get(key) in _CATEGORY]:
+        return categories[0]
     if tags.get("amenity") == "place_of_worship":
         return "church"
     return "shop_building" if "shop" in tags else "office_building" if "office" in tags else "building"
@@ -143,7 +141,7 @@ def _bodies(
             continue
         base, top, roof, rise = _heights(area, plan, usual, None if part else summary)
         out.append({
-            **rings_of(plan), **({"base_m": round(base, 2)} if base else {}), "top_m": round(top, 2), "roof": roof,
+            "plan": plan, **({"base_m": round(base, 2)} if base else {}), "top_m": round(top, 2), "roof": roof,
             **({"roof_m": round(rise, 2)} if rise else {}),
         })  # fmt: skip
     return out
@@ -155,11 +153,8 @@ def _heights(
     """Base, top, roof shape and roof rise, metres above ground."""
     tags, kind = area.tags, category(area.tags)
     height, levels = metres(tags, "height", "building:height"), count(tags, "building:levels")
-    if levels is None:
-        small = 1 if plan.area < 60.0 else 2 if plan.area < 160.0 else usual
-        levels_used = TABLES["levels"].get(kind, small)
-    else:
-        levels_used = levels
+    small = 1 if plan.area < 60.0 else 2 if plan.area < 160.0 else usual
+    levels_used = TABLES["levels"].get(kind, small) if levels is None else levels
     if summary is not None:
         summary["height" if height else "levels" if levels else "rule"] += 1
     form = _ROOFS.get(tags.get("roof:shape", ""), "") or _usual_roof(area, kind, levels_used)
@@ -167,12 +162,8 @@ def _heights(
     half = float(shapely.maximum_inscribed_circle(plan, tolerance=0.1).length)
     rise = metres(tags, "roof:height")
     if rise is None:
-        roof_levels = count(tags, "roof:levels")
-        rise = (
-            roof_levels * _ROOF_LEVEL_M
-            if roof_levels
-            else min(half * (1.0 if form == "dome" else _PITCH), _MAX_RISE_M)
-        )
+        usual_rise = min(half * (1.0 if form == "dome" else _PITCH), _MAX_RISE_M)
+        rise = (count(tags, "roof:levels") or 0) * _ROOF_LEVEL_M or usual_rise
     rise = 0.0 if form == "flat" else rise
     base = metres(tags, "min_height", "building:min_height") or STOREY_M * (count(tags, "building:min_level") or 0)
     if height is None:
@@ -181,7 +172,7 @@ def _heights(
     base = min(base, height - 1.0)
     if rise > 0.8 * (height - base):
         rise = 0.5 * (height - base)
-    return base, height, form if rise >= 0.3 else "flat", rise if rise >= 0.3 else 0.0
+    return (base, height, form, rise) if rise >= 0.3 else (base, height, "flat", 0.0)
 
 
 def _usual_roof(area: Feature, kind: str, levels: int) -> str:
@@ -197,9 +188,7 @@ def _wall(area: Feature, kind: str, top_m: float) -> tuple[str, str]:
     given, material = colour(tags, "building:colour", "building:color"), tags.get("building:material", "")
     paint = given or _pick(area, "plaster")
     brick = given or _pick(area, "brick")
-    if material == "glass" or (
-        kind == "office_building" and not given and material in ("", "glass", "steel", "metal")
-    ):
+    if material == "glass" or (kind == "office_building" and not given and material in ("", "steel", "metal")):
         spec = "curtain_wall" if material == "glass" else _pick(area, "office")
     elif material == "wood":
         spec = f"planks:{given or '#b59468'}"
@@ -212,10 +201,8 @@ def _wall(area: Feature, kind: str, top_m: float) -> tuple[str, str]:
     else:
         spec = f"facade_flats:{paint}"
     shade = spec.partition(":")[2]
-    word = (
-        colour_name(parse_colour(shade)) if shade and not spec.startswith(("curtain_wall", "facade_office")) else ""
-    )
-    return spec, word
+    painted = shade and not spec.startswith(("curtain_wall", "facade_office"))
+    return spec, colour_name(parse_colour(shade)) if painted else ""
 
 
 def _roofing(area: Feature, pitched: bool, kind: str) -> str:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import bisect
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from itertools import accumulate
 from typing import Any
 
 import numpy as np
@@ -57,9 +59,8 @@ class Streets:
 
     def street(self, x: float, y: float, within_m: float = 14.0) -> str:
         """Name of the street that a point is on; empty where none has a name within reach."""
-        spot = Point(x, y)
-        named = [(float(spot.distance(line)), road["name"]) for road, line in zip(self.roads, self.lines, strict=True)
-                 if road.get("name")]  # fmt: skip
+        spot, streets = Point(x, y), zip(self.roads, self.lines, strict=True)
+        named = ((float(spot.distance(line)), road["name"]) for road, line in streets if road.get("name"))
         away, name = min(named, default=(math.inf, ""))
         return name if away <= within_m else ""
 
@@ -114,7 +115,7 @@ class Furniture:
         street = "" if phrase else self._streets.street(pose.x, pose.y)
         # Plants come as often as their weights say: nobody plants every fifth tree pink.
         prop = self._site.catalogue[category]
-        alike = next(iter(v.name for v in prop.variants), None) if category in _ALIKE else None
+        alike = prop.variants[0].name if category in _ALIKE else None
         return self._placer.place(
             category, pose, phrase=phrase or (f"on {street}" if street else ""), scale=scale, variant=alike,
             drawn=prop.kind == "vegetation",
@@ -183,7 +184,7 @@ class Furniture:
                     self._try(_drawn(TABLES["driven"], rng.random()), Pose(x, y, facing))
 
     def _car_park(self, area: Table, k: int) -> None:
-        plan = plan_of(area).intersection(self._site.extent)
+        plan = area["plan"].intersection(self._site.extent)
         name = area.get("name", "")
         for x, y, yaw, count in car_park_rows(area, self._site.extent):
             # On a floor no marks are painted: those are in the plan already.
@@ -216,11 +217,10 @@ class Furniture:
 
     def _on_roofs(self, building: Table, k: int) -> None:
         """Set out what stands on flat roofs, away from their edges."""
-        plans = [plan_of(body) for body in building["bodies"]]
-        base = min(self._site.ground_z(x, y) for plan in plans for x, y in plan.exterior.coords)
-        turn = k
-        for body, plan in zip(building["bodies"], plans, strict=True):
-            room = plan.buffer(-_FROM_EDGE_M)
+        bodies, turn = building["bodies"], k
+        base = min(self._site.ground_z(x, y) for body in bodies for x, y in body["plan"].exterior.coords)
+        for body in bodies:
+            room = body["plan"].buffer(-_FROM_EDGE_M)
             if building.get("canopy") or body["roof"] != "flat" or room.area < _MIN_ROOF_M2:
                 continue
             rng = self._site.rng_for("roof", k, round(room.area))
@@ -234,7 +234,7 @@ class Furniture:
 
     def _before_shop(self, building: Table) -> None:
         turn = 0
-        for pose in before_walls(plan_of(building["bodies"][0]).simplify(0.5), 6.5, 1.1, 1.5):
+        for pose in before_walls(building["bodies"][0]["plan"].simplify(0.5), 6.5, 1.1, 1.5):
             rng = self._site.rng_for("shop", round(pose.x, 1), round(pose.y, 1))
             near = self._streets.nearest(pose.x, pose.y)
             if near is None or near[1] > 16.0 or rng.random() >= _SHARE_FURNITURE * 0.5:
@@ -242,12 +242,12 @@ class Furniture:
             turn += self._on_street(_next("shops", turn + int(rng.integers(len(_IN_TURN["shops"])))), pose)
 
     def _grow(self, area: Table, k: int) -> None:
-        whole = plan_of(area)
+        whole = area["plan"]
         plan: BaseGeometry = whole.intersection(self._site.extent.buffer(-1.5))
         plan = plan.difference(self._streets.layout.carriageways.buffer(1.5))
-        paths = [LineString(r["line"]).buffer(r["width_m"] / 2 + 1.0) for r in self._town["roads"]
-                 if r["kind"] == "path"]  # fmt: skip
-        plan = plan.difference(shapely.union_all(paths)) if paths else plan
+        paths = [road for road in self._town["roads"] if road["kind"] == "path"]
+        beside = [LineString(path["line"]).buffer(path["width_m"] / 2 + 1.0) for path in paths]
+        plan = plan.difference(shapely.union_all(beside)) if beside else plan
         mapped = sum(t["category"] in _ROOTED and whole.contains(Point(t["at"])) for t in self._town["things"])
         if plan.is_empty or (area["grows"] == "park" and mapped >= _MIN_TREES):
             return
@@ -259,28 +259,22 @@ class Furniture:
                 self._try(kinds[int(rng.integers(len(kinds)))], pose, phrase)
 
 
-def plan_of(table: Table) -> Polygon:
-    """Return the plan of an area or of a body of a building."""
-    return Polygon(table["outline"], table.get("holes", ()))
-
-
 def car_park_rows(area: Table, extent: BaseGeometry) -> list[list[Any]]:
     """Lay rows of bays along the longer side of a car park, an aisle between each two: x, y, yaw, count."""
-    plan = plan_of(area).intersection(extent).buffer(-0.3)
+    plan = area["plan"].intersection(extent).buffer(-0.3)
     if not isinstance(plan, Polygon) or plan.area < 30.0:
         return []
     (x, y), long, wide, yaw = oriented_rectangle(plan)
     depth, aisle = 5.2, 6.0
     count = int(long // 2.6)
     v = -wide / 2
-    rows: list[tuple[float, float]] = []
-    while v + depth <= wide / 2 + 0.01:
-        rows.append((v, -90.0))
-        if v + 2 * depth + aisle <= wide / 2 + 0.01:
-            rows.append((v + 2 * depth + aisle, 90.0))
+    poses = []
+    while count and v + depth <= wide / 2 + 0.01:
+        poses.append(Frame(x, y, yaw).pose(0.0, v, -90.0))
         v += 2 * depth + aisle
-    poses = [Frame(x, y, yaw).pose(0.0, closed, turn) for closed, turn in rows]
-    return [[round(p.x, 2), round(p.y, 2), round(p.yaw_deg, 2), min(count, 200)] for p in poses] if count else []
+        if v <= wide / 2 + 0.01:
+            poses.append(Frame(x, y, yaw).pose(0.0, v, 90.0))
+    return [[round(p.x, 2), round(p.y, 2), round(p.yaw_deg, 2), min(count, 200)] for p in poses]
 
 
 def _kerbside(road: Table, line: LineString, spacing_m: float, offset_m: float) -> Iterator[Pose]:
@@ -306,9 +300,6 @@ def _next(place: str, turn: int) -> str:
 
 
 def _drawn(weights: Mapping[str, float], u: float) -> str:
-    total, at = sum(weights.values()), 0.0
-    for name, weight in weights.items():
-        at += weight / total
-        if u < at:
-            return name
-    return next(reversed(list(weights)))
+    total = sum(weights.values())
+    k = bisect.bisect(list(accumulate(weight / total for weight in weights.values())), u)
+    return [*weights][min(k, len(weights) - 1)]

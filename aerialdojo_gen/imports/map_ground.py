@@ -11,7 +11,7 @@ from shapely.geometry.base import BaseGeometry
 from shapely.ops import polygonize, unary_union
 
 from aerialdojo_gen.imports.map_bridges import BRIDGE
-from aerialdojo_gen.imports.map_buildings import plans_of, rings_of
+from aerialdojo_gen.imports.map_buildings import plans_of
 from aerialdojo_gen.imports.map_tags import SURFACES, TABLES, Tags, below_ground, by_word, count, metres
 from aerialdojo_gen.imports.osm import Feature
 
@@ -74,9 +74,8 @@ def _street(tags: Tags) -> dict[str, Any] | None:
     tagged = count(tags, "lanes")
     lanes = min(tagged or (max(lanes - 1, 1) if oneway else lanes), 8)
     parking = kind == "side" and _parks(tags, by_rule=kind_of in ("residential", "unclassified", "living_street"))
-    width = metres(tags, "width", "est_width") or (
-        (lanes * _LANE_M if tagged or oneway else width) + (2 * _PARKED_M if parking else 0.0)
-    )
+    usual = (lanes * _LANE_M if tagged or oneway else width) + (2 * _PARKED_M if parking else 0.0)
+    width = metres(tags, "width", "est_width") or usual
     sidewalk = tags.get("sidewalk", tags.get("sidewalk:both", ""))
     pavement = 0.0 if sidewalk in ("no", "none") else min(pavement, 1.2) if sidewalk == "separate" else pavement
     surface = surface or ("dirt" if kind_of == "track" else "asphalt")
@@ -94,14 +93,9 @@ def _wide(width: float) -> float:
 
 
 def _parks(tags: Tags, *, by_rule: bool) -> bool:
-    values = [
-        v
-        for k, v in tags.items()
-        if k.startswith("parking:") and k.count(":") <= 2 and not k.endswith(("fee", "conditional"))
-    ]
-    if values:
-        return any(v in _PARKED for v in values)
-    return by_rule
+    keys = [k for k in tags if k.startswith("parking:") and k.count(":") <= 2]
+    values = [tags[k] for k in keys if not k.endswith(("fee", "conditional"))]
+    return any(v in _PARKED for v in values) if values else by_rule
 
 
 def rails(lines: Sequence[Feature], window: Polygon, on: str = "") -> list[list[list[float]]]:
@@ -112,11 +106,11 @@ def rails(lines: Sequence[Feature], window: Polygon, on: str = "") -> list[list[
 
 
 def areas(
-    found: Iterable[Feature], lines: Sequence[Feature], window: Polygon, summary: Counter[str]
+    features: Iterable[Feature], lines: Sequence[Feature], window: Polygon, summary: Counter[str]
 ) -> list[dict[str, Any]]:
     """Make the plan's areas, larger ones first, water above land."""
     out: list[tuple[bool, float, str, dict[str, Any]]] = []
-    for feature in found:
+    for feature in features:
         rule = _ground(feature.tags)
         if rule is None or below_ground(feature.tags) or "building" in feature.tags:
             continue
@@ -152,7 +146,7 @@ def _areas(
 ) -> list[dict[str, Any]]:
     optional = {k: v for k, v in {"grows": grows, "parking": parking, "name": name}.items() if v}
     plans = (plan for plan in plans_of(shape, 0.1, summary) if plan.area >= _LEAST_AREA_M2)
-    return [{"material": material, **optional, **rings_of(plan)} for plan in plans]
+    return [{"material": material, **optional, "plan": plan} for plan in plans]
 
 
 def _sea(lines: Sequence[Feature], window: Polygon) -> list[Polygon]:

@@ -17,7 +17,8 @@ from shapely.geometry import LineString
 from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.imports import map_bridges, map_buildings, map_ground, map_props
 from aerialdojo_gen.imports.earth import Bbox, LocalFrame, format_bbox, size_m
-from aerialdojo_gen.imports.map_furniture import Furniture, Streets, car_park_rows, plan_of
+from aerialdojo_gen.imports.map_buildings import area_of
+from aerialdojo_gen.imports.map_furniture import Furniture, Streets, car_park_rows
 from aerialdojo_gen.imports.map_tags import TABLES
 from aerialdojo_gen.imports.osm import ATTRIBUTION, Feature, Map
 from aerialdojo_gen.imports.placing import Placer
@@ -59,14 +60,14 @@ def _place_things(placer: Placer, town: Mapping[str, list[Any]], drive_on: str) 
         road for road, street in zip(town["roads"], streets, strict=True)
         if street.kind != "path" and layout.on_ground(street)
     ]  # fmt: skip
-    found = Streets(tuple(level), tuple(LineString(road["line"]) for road in level), layout)
-    furniture = Furniture(placer, town, found, drive_on)
+    level_streets = Streets(tuple(level), tuple(LineString(road["line"]) for road in level), layout)
+    furniture = Furniture(placer, town, level_streets, drive_on)
     furniture.place_mapped()
     furniture.place_by_rule()
 
 
 def town_plan(
-    found: Map, bbox: Bbox, source: str, options: TownOptions,
+    mapped: Map, bbox: Bbox, source: str, options: TownOptions,
     heights: Callable[[LocalFrame, tuple[float, float]], HeightTable] | None,
 ) -> tuple[PlacePlan, Counter[str]]:  # fmt: skip
     """Make the plan of a town; its origin is the centre of the bounding box (degrees)."""
@@ -79,18 +80,16 @@ def town_plan(
     frame, site = LocalFrame.about(bbox), rectangle(-width / 2, -depth / 2, width / 2, depth / 2)
     table = None if heights is None else heights(frame, (width, depth))
     summary: Counter[str] = Counter()
-    town, built_share = _town(found, frame, site, table, summary)
+    town, built_share = _town(mapped, frame, site, table, summary)
     if not any(town[key] for key in ("buildings", "roads", "areas", "things")):
         raise UsageError(
-            f"--bbox {format_bbox(bbox)} contains no map data: {source} covers {format_bbox(found.extent)}"
+            f"--bbox {format_bbox(bbox)} contains no map data: {source} covers {format_bbox(mapped.extent)}"
         )
     entries, sections = _entries(town, site)
     tops = [b["top_m"] for one in town["buildings"] for b in one["bodies"]]
     tops += [max(b["heights_m"]) for b in town["bridges"]]
     top = max(tops, default=0.0) + (0.0 if table is None else float(table.rows_m.max()))
-    ceiling = options.ceiling_m
-    if ceiling is None:
-        ceiling = max(math.ceil(top + _HEADROOM_M), _LOWEST_CEILING_M)
+    ceiling = max(math.ceil(top + _HEADROOM_M), _LOWEST_CEILING_M) if options.ceiling_m is None else options.ceiling_m
     plan = {
         "plan": 1, "seed": options.seed, "size_m": [width, depth], "ceiling_m": float(ceiling),
         "attribution": "; ".join(filter(None, (ATTRIBUTION, options.attribution))),
@@ -109,15 +108,15 @@ def town_plan(
 
 
 def _town(
-    found: Map, frame: LocalFrame, site: shapely.Polygon, table: HeightTable | None, summary: Counter[str]
+    mapped: Map, frame: LocalFrame, site: shapely.Polygon, table: HeightTable | None, summary: Counter[str]
 ) -> tuple[dict[str, list[Any]], float]:
     """Collect what the map has, in metres, and the share of the site that is built up."""
     window = site.buffer(_BEYOND_M, join_style="mitre")
-    points, lines, areas = (_in_metres(frame, features) for features in (found.points, found.lines, found.areas))
+    points, lines, areas = (_in_metres(frame, some) for some in (mapped.points, mapped.lines, mapped.areas))
     inner = site.buffer(-0.3, join_style="mitre")
     shops = map_props.shop_points(points, areas)
     buildings = map_buildings.buildings([a for a in areas if a.shape.intersects(site)], shops, inner, summary)
-    built = shapely.union_all([plan_of(b) for one in buildings for b in one["bodies"]])
+    built = shapely.union_all([b["plan"] for one in buildings for b in one["bodies"]])
     ground = None if table is None else table.terrain()
     raised, lines = map_bridges.bridges(
         lines, areas, site, (lambda x, y: 0.0) if ground is None else lambda x, y: float(ground.z(x, y)), summary
@@ -156,15 +155,21 @@ def _entries(town: Mapping[str, list[Any]], site: shapely.Polygon) -> tuple[list
 
     # Later ones cover earlier ones: only neighbours of one material share an entry.
     groups = [(key, list(group)) for key, group in groupby(town["areas"], key=lambda area: area["material"])]
-    add("Kinds of ground", [{"paint": [_area(one) for one in group], "material": key} for key, group in groups])
+    add(
+        "Kinds of ground",
+        [{"paint": [area_of(one["plan"]) for one in group], "material": key} for key, group in groups],
+    )
     streets = {"make": "street_network", "streets": [_street(road) for road in town["roads"]]}
     streets |= {key: town[key] for key in ("bridges", "rails", "crossings") if town[key]}
     add("Streets, paths and bridges", [streets] if town["roads"] or town["bridges"] or town["rails"] else [])
     rows = [row for area in town["areas"] if area.get("parking") for row in car_park_rows(area, site)]
     add("Bays of car parks", [{"make": "parking_rows", "rows": rows}] if rows else [])
-    whole = [{**one, "bodies": [_body(body) for body in one["bodies"]]} for one in town["buildings"]]
+    whole = [
+        {**one, "bodies": [{"outline": area_of(body["plan"]), **_without(body, "plan")} for body in one["bodies"]]}
+        for one in town["buildings"]
+    ]
     add("Buildings", [{"make": "buildings", "buildings": whole}] if whole else [])
-    wet = [_area(area) for area in town["areas"] if area["material"].startswith("water")]
+    wet = [area_of(area["plan"]) for area in town["areas"] if area["material"].startswith("water")]
     add("Nothing stands in the water", [{"make": "keep_free", "areas": wet}] if wet else [])
     add("Walls, fences and hedges", list(_barriers(town["barriers"], site)))
     return out, sections
@@ -172,34 +177,27 @@ def _entries(town: Mapping[str, list[Any]], site: shapely.Polygon) -> tuple[list
 
 def _barriers(barriers: Sequence[Mapping[str, Any]], site: shapely.Polygon) -> list[dict[str, Any]]:
     """Make the entries of barriers, by kind and height, of the legs that lie on the site."""
-    groups: dict[tuple[str, float], list[Any]] = {}
+    groups: dict[tuple[str, float], dict[str, Any]] = {}
     for barrier in barriers:
+        kind, high = barrier["kind"], barrier["height_m"]
         line = shapely.intersection(LineString(barrier["line"]), site.buffer(-0.4))
         for leg in shapely.get_parts(line):
             if isinstance(leg, LineString) and leg.length > 0.6:
+                entry = TABLES["barriers"][kind]["entry"]
+                own = entry | ({"height_m": high} if "height_m" in entry else {}) | {"lines": []}
                 points = [[round(x, 2), round(y, 2)] for x, y in leg.simplify(0.1).coords]
-                groups.setdefault((barrier["kind"], barrier["height_m"]), []).append(points)
-    made = []
-    for (kind, high), lines in groups.items():
-        entry = TABLES["barriers"][kind]["entry"]
-        made.append({key: high if key == "height_m" else value for key, value in entry.items()} | {"lines": lines})
-    return made
+                groups.setdefault((kind, high), own)["lines"].append(points)
+    return list(groups.values())
 
 
 def _street(road: Mapping[str, Any]) -> dict[str, Any]:
     """Return a street as the plan has it: whether cars park and drive there is seen by the cars."""
     kind = {} if road["kind"] in ("main", "side") else {"kind": road["kind"]}
-    return kind | {key: value for key, value in road.items() if key not in ("kind", "parking")}
+    return kind | _without(road, "kind", "parking")
 
 
-def _area(table: Mapping[str, Any]) -> dict[str, Any]:
-    holes = [{"polygon": hole} for hole in table.get("holes", ())]
-    return {"polygon": table["outline"], **({"minus": holes} if holes else {})}
-
-
-def _body(table: Mapping[str, Any]) -> dict[str, Any]:
-    kept = {key: value for key, value in table.items() if key not in ("outline", "holes")}
-    return {"outline": _area(table), **kept}
+def _without(table: Mapping[str, Any], *keys: str) -> dict[str, Any]:
+    return {key: value for key, value in table.items() if key not in keys}
 
 
 def _points(table: Mapping[str, Any]) -> dict[str, Any]:

@@ -38,13 +38,12 @@ def props(points: Sequence[Feature], lines: Sequence[Feature], areas: Sequence[F
             continue
         out.append(_thing(category, at, feature.tags))
     for feature in lines:
-        spacing = _SPACING_M.get(
-            "tree_row" if feature.tags.get("natural") == "tree_row" else feature.tags.get("barrier", "")
-        )
+        row = feature.tags.get("natural") == "tree_row"
+        spacing = _SPACING_M.get("tree_row" if row else feature.tags.get("barrier", ""))
         if spacing and not below_ground(feature.tags):
             category = "urban_tree" if "natural" in feature.tags else "bollard"
-            out += [_thing(category, p, feature.tags) for p in _along(feature.shape, spacing)
-                    if site.contains(p) and not built.contains(p)]  # fmt: skip
+            places = (p for p in _along(feature.shape, spacing) if site.contains(p) and not built.contains(p))
+            out += [_thing(category, p, feature.tags) for p in places]
     for feature in areas:
         category = _category(feature.tags)
         at = feature.shape.representative_point()

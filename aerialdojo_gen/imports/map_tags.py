@@ -54,8 +54,8 @@ def bearing_deg(tags: Tags, *keys: str) -> float | None:
 
 def count(tags: Tags, *keys: str) -> int | None:
     """Read a whole number above 0, rounded; None if no key has one."""
-    found = metres(tags, *keys)
-    return None if found is None else max(round(found), 1)
+    number = metres(tags, *keys)
+    return None if number is None else max(round(number), 1)
 
 
 def colour(tags: Tags, *keys: str) -> str:

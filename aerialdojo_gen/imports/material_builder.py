@@ -36,29 +36,27 @@ class MaterialBuilder:
 
     def parts(self, body: RawNode, double_sided: bool) -> tuple[Part, ...]:
         """Make a body's parts, one per material, sorted by material name."""
-        found: list[tuple[Material, Part]] = []
+        made: list[tuple[Material, Part]] = []
         kind = _face_kinds(body)
         plain = kind == _PLAIN
         for rgb in np.unique(body.colours[plain], axis=0):
             rows = plain & (body.colours == rgb).all(axis=1)
             red, green, blue = (int(c) for c in rgb)
             name = f"#{red:02x}{green:02x}{blue:02x}"
-            found += self._build_parts(body, rows, Material(name, (red, green, blue), double_sided=double_sided))
+            made += self._build_parts(body, rows, Material(name, (red, green, blue), double_sided=double_sided))
         painted = kind == _PAINTED
         if painted.any():
             # White: vertex colours replace it, or are multiplied by it without effect.
             paint = Material(_MIXED, (255, 255, 255), atlas=True, double_sided=double_sided, unlit=self.baked)
-            found += self._build_parts(body, painted, paint)
+            made += self._build_parts(body, painted, paint)
         for k in np.unique(kind[kind >= 0]):
-            found += self._build_parts(body, kind == k, self._textured(body.surfaces[k], double_sided))
-        return tuple(part for _, part in sorted(found, key=lambda pair: pair[0].name))
+            made += self._build_parts(body, kind == k, self._textured(body.surfaces[k], double_sided))
+        return tuple(part for _, part in sorted(made, key=lambda pair: pair[0].name))
 
     def measure_texture_scales(self, nodes: Sequence[RawNode]) -> None:
         """Measure the metres that each texture's width covers, over all nodes that show it; vertices in metres."""
-        shown = _shown_areas(nodes)
-        self._scales = {
-            key: float(np.sqrt(world / flat)) if flat > 0 else 1.0 for key, (world, flat) in shown.items()
-        }
+        shown = _shown_areas(nodes).items()
+        self._scales = {key: float(np.sqrt(world / flat)) if flat > 0 else 1.0 for key, (world, flat) in shown}
 
     def _textured(self, surface: RawSurface, double_sided: bool) -> Material:
         both = double_sided or (surface.mask is not None and surface.double_sided)
@@ -82,8 +80,7 @@ class MaterialBuilder:
         if not solid.any():
             return []
         used, index = np.unique(faces[solid], return_inverse=True)
-        uv = np.zeros((len(used), 2), dtype=np.float32)
-        colours = None
+        uv, colours = np.zeros((len(used), 2), dtype=np.float32), None
         if carried is not None and material.texture is not None:
             uv = carried[used].astype(np.float32)
         elif carried is not None:
@@ -133,17 +130,13 @@ def _shown_areas(nodes: Sequence[RawNode]) -> dict[str, tuple[float, float]]:
         kind = _face_kinds(node)
         for k in np.unique(kind[kind >= 0]):
             rows, key = kind == k, node.surfaces[k].digest
+            assert node.corners is not None
+            uv = node.corners[rows][..., :2].astype(np.float64)
+            a, b = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
             own = float(areas(node.vertices, node.faces[rows].astype(np.int32)).sum())
             world, flat = shown.get(key, (0.0, 0.0))
-            shown[key] = world + own, flat + float(_uv_areas(node, rows).sum())
+            shown[key] = world + own, flat + float((np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / 2.0).sum())
     return shown
-
-
-def _uv_areas(node: RawNode, rows: NDArray[np.bool_]) -> NDArray[np.float64]:
-    assert node.corners is not None
-    uv = node.corners[rows][..., :2].astype(np.float64)
-    a, b = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
-    return np.asarray(np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / 2.0)
 
 
 def _split(

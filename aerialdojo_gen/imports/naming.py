@@ -140,11 +140,10 @@ def _parse(words: Sequence[str]) -> tuple[str, dict[str, str]]:
         "colour": word_list("colours"), "size": word_list("sizes"), "material": materials,
         "state": word_list("states"),
     }  # fmt: skip
-    said: dict[str, str] = {}
-    rest: list[str] = []
+    said, rest = dict[str, str](), list[str]()
     for k, word in enumerate(words):
         spelt = spelling.get(word, word)
-        key = next((key for key, known in kinds.items() if spelt in known), "")
+        key = next((key for key, vocabulary in kinds.items() if spelt in vocabulary), "")
         shade = [spelling.get(w, w) for w in words[k + 1 : k + 2]]
         if key == "state" and said.get(key) not in (None, "old"):
             continue

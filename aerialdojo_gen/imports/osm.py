@@ -48,6 +48,10 @@ class Feature:
     shape: Any  # Point, LineString or Polygon, degrees; parts of a multipolygon are features with the same key
     tags: Tags  # As mapped
 
+    def order(self) -> tuple[str, list[tuple[str, str]], bytes]:
+        """Key by which features are sorted, whatever their order in the file."""
+        return self.key, sorted(self.tags.items()), shapely.to_wkb(self.shape)
+
 
 @dataclass(frozen=True)
 class Map:
@@ -78,17 +82,16 @@ def read_maps(path: Path, boxes: Sequence[Bbox]) -> list[Map]:
         out = folder / "found.json"
         args = [str(out), json.dumps(boxes)]
         read_in_sandbox(__name__, path, args, MAX_MEMORY_BYTES, _extract_advice(path, boxes))
-        found = json.loads(out.read_text(encoding="utf-8"))
-    west, south, east, north = found["extent"]
-    extent = (west, south, east, north)
+        content = json.loads(out.read_text(encoding="utf-8"))
+    west, south, east, north = extent = tuple(content["extent"])
     maps = []
-    for box, own in zip(boxes, found["boxes"], strict=True):
+    for box, own in zip(boxes, content["boxes"], strict=True):
         if not any(own.values()):
             disjoint = box[0] > east or box[2] < west or box[1] > north or box[3] < south
             why = "lies outside the extract" if disjoint else "contains no map data"
             raise UsageError(f"--bbox {format_bbox(box)} {why}: {path.name} covers {format_bbox(extent)}")
         points, lines, areas = (
-            tuple(sorted((Feature(k, shapely.from_wkb(shape), t) for k, shape, t in own[kind]), key=_order))
+            tuple(sorted((Feature(k, shapely.from_wkb(shape), t) for k, shape, t in own[kind]), key=Feature.order))
             for kind in _KINDS
         )
         maps.append(Map(points, lines, areas, extent))
@@ -96,19 +99,17 @@ def read_maps(path: Path, boxes: Sequence[Bbox]) -> list[Map]:
 
 
 def _extract_advice(path: Path, boxes: Sequence[Bbox]) -> str:
-    west, south = (min(box[k] for box in boxes) for k in (0, 1))
-    east, north = (max(box[k] for box in boxes) for k in (2, 3))
-    where = f"{west:g},{south:g},{east:g},{north:g}"
+    where = ",".join(f"{v:g}" for v in (*np.min(boxes, axis=0)[:2], *np.max(boxes, axis=0)[2:]))
     return f"cut a part out of it first, e.g. osmium extract --bbox {where} {path.name} -o part.osm.pbf"
 
 
 def read_into(path: Path, out: Path, boxes: Sequence[Bbox]) -> str:
     """Read an extract in the sandboxed child process; returns the error message, or an empty string."""
     try:
-        found, extent = _read(importlib.import_module("osmium"), path, boxes)
+        content, extent = _read(importlib.import_module("osmium"), path, boxes)
         if extent is None:
             return "holds no points"
-        out.write_text(json.dumps({"extent": extent, "boxes": found}), encoding="utf-8")
+        out.write_text(json.dumps({"extent": extent, "boxes": content}), encoding="utf-8")
     except Exception as error:  # untrusted files can make a reader fail in any way: report it
         if isinstance(error, MemoryError) or is_out_of_memory(str(error)):
             raise MemoryError from None
@@ -117,35 +118,27 @@ def read_into(path: Path, out: Path, boxes: Sequence[Bbox]) -> str:
     return ""
 
 
-def _order(feature: Feature) -> tuple[str, list[tuple[str, str]], bytes]:
-    return feature.key, sorted(feature.tags.items()), shapely.to_wkb(feature.shape)
-
-
-def _key(shape: Any) -> str:
-    # OpenStreetMap coordinates have seven decimals.
-    return " ".join(f"{degrees:.7f}" for degrees in shape.bounds)
-
-
 def _read(osmium: Any, path: Path, boxes: Sequence[Bbox]) -> tuple[list[dict[str, list[_RawFeature]]], Bbox | None]:
     """Read a file once; the extent is computed from its points, as a header need not state it."""
     windows = shapely.box(*np.asarray(boxes, dtype=np.float64).T)
     extent_box = shapely.box(*shapely.total_bounds(windows))
     for shape in (windows, extent_box):
         shapely.prepare(shape)
-    found: list[dict[str, list[_RawFeature]]] = [{kind: [] for kind in _KINDS} for _ in boxes]
-    low, high = [1e9, 1e9], [-1e9, -1e9]
+    content: list[dict[str, list[_RawFeature]]] = [{kind: [] for kind in _KINDS} for _ in boxes]
+    low, high = (1e9, 1e9), (-1e9, -1e9)
     factory = osmium.geom.WKBFactory()
 
     def keep(kind: str, shape: Any, part: Any, tags: Tags) -> None:
         if not extent_box.intersects(part):
             return
+        key = " ".join(f"{degrees:.7f}" for degrees in shape.bounds)  # as many decimals as the map has
         for k in np.flatnonzero(shapely.intersects(windows, part)):
-            found[k][kind].append((_key(shape), str(shapely.to_wkb(part, hex=True)), tags))
+            content[k][kind].append((key, str(shapely.to_wkb(part, hex=True)), tags))
 
     for thing in osmium.FileProcessor(str(path)).with_locations().with_areas():
         if thing.is_node():
             lon, lat = thing.location.lon, thing.location.lat
-            low, high = [min(low[0], lon), min(low[1], lat)], [max(high[0], lon), max(high[1], lat)]
+            low, high = (min(low[0], lon), min(low[1], lat)), (max(high[0], lon), max(high[1], lat))
             if thing.tags:
                 point = shapely.Point(lon, lat)
                 keep("points", point, point, dict(thing.tags))
@@ -167,8 +160,7 @@ def _read(osmium: Any, path: Path, boxes: Sequence[Bbox]) -> tuple[list[dict[str
             for part in shapely.get_parts(whole):
                 if isinstance(part, Polygon):
                     keep("areas", whole, part, tags)
-    extent = None if low[0] > high[0] else (low[0], low[1], high[0], high[1])
-    return found, extent
+    return content, None if low[0] > high[0] else (*low, *high)
 
 
 def _is_area(tags: Tags) -> bool:

@@ -84,8 +84,8 @@ def _surface(material: SourceMaterial, decoded: dict[bytes, tuple[NDArray[Any] |
             grey = _channels(other)[0].max(axis=2)
             alpha = cv2.resize(grey, (rgb.shape[1], rgb.shape[0]), interpolation=cv2.INTER_AREA).astype(np.uint8)
     mask = _mask(alpha, material)
-    seen = rgb.reshape(-1, 3) if mask is None or not mask.any() else rgb[mask]
-    red, green, blue = (int(c) for c in seen.mean(axis=0, dtype=np.float64).round())
+    opaque = rgb.reshape(-1, 3) if mask is None or not mask.any() else rgb[mask]
+    red, green, blue = (int(c) for c in opaque.mean(axis=0, dtype=np.float64).round())
     is_jpeg = material.image[:3] == b"\xff\xd8\xff" and image.ndim == 3
     jpeg = material.image if white and mask is None and is_jpeg else b""
     return replace(plain, colour=(red, green, blue), texture=rgb, mask=mask, jpeg=jpeg)
@@ -130,7 +130,7 @@ def _channels(image: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], NDArray[np.u
 def _limit_sizes(made: list[RawSurface], texture_px: int) -> list[RawSurface]:
     """Reduce textures until each one, and all together, are within the limits."""
     different = {s.digest: s for s in made if s.texture is not None}
-    sides = {d: s.texture.shape[:2] for d, s in different.items() if s.texture is not None}
+    sides = {s.digest: s.texture.shape[:2] for s in made if s.texture is not None}
     size = {d: _fit_size(shape, texture_px) for d, shape in sides.items()}
     while sum(h * w for h, w in size.values()) > TEXELS:
         largest = max(max(shape) for shape in size.values())
@@ -139,27 +139,21 @@ def _limit_sizes(made: list[RawSurface], texture_px: int) -> list[RawSurface]:
     return [resized.get(s.digest, s) for s in made]
 
 
-def _fit_size(shape: tuple[int, ...], most: int) -> tuple[int, int]:
-    height, width = shape[0], shape[1]
-    longest = max(height, width)
-    if longest <= most:
-        return height, width
-    return max(1, round(height * most / longest)), max(1, round(width * most / longest))
+def _fit_size(shape: tuple[int, ...], most: int) -> tuple[int, ...]:
+    longest = max(shape)
+    return shape if longest <= most else tuple(max(1, round(side * most / longest)) for side in shape)
 
 
-def _resize(surface: RawSurface, size: tuple[int, int]) -> RawSurface:
+def _resize(surface: RawSurface, size: tuple[int, ...]) -> RawSurface:
     assert surface.texture is not None
     height, width = surface.texture.shape[:2]
     smaller = cv2.resize(surface.texture, size[::-1], interpolation=cv2.INTER_AREA)
     mask = surface.mask
     if mask is not None:
         mask = cv2.resize(mask.astype(np.float32), size[::-1], interpolation=cv2.INTER_AREA) >= CUTOFF
-    note = (
-        f"{surface.name or 'a material'}: its texture of {width} x {height} pixels is kept at {size[1]} x {size[0]}"
-    )
-    return replace(
-        surface, texture=np.asarray(smaller, dtype=np.uint8), mask=mask, jpeg=b"", notes=(*surface.notes, note)
-    )
+    kept = f"its texture of {width} x {height} pixels is kept at {size[1]} x {size[0]}"
+    notes = (*surface.notes, f"{surface.name or 'a material'}: {kept}")
+    return replace(surface, texture=np.asarray(smaller, dtype=np.uint8), mask=mask, jpeg=b"", notes=notes)
 
 
 def _srgb_to_linear(srgb: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from aerialdojo_gen.base.errors import AssetError, UsageError
@@ -16,7 +17,7 @@ from aerialdojo_gen.imports.map_plan import TownOptions, town_plan
 from aerialdojo_gen.imports.osm import read_maps
 from aerialdojo_gen.imports.placing import Placer
 from aerialdojo_gen.imports.project import PIPELINE, make_project
-from aerialdojo_gen.imports.relief import PlacePlan, ReliefOptions, ground_sampler, relief_plan
+from aerialdojo_gen.imports.relief import PlacePlan, ReliefOptions, relief_plan, town_ground
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.scenes.plans import HEIGHTS_SUFFIX
@@ -60,12 +61,12 @@ def add_map(
         raise UsageError(f"{len(boxes):,} scenes requested, the maximum is {_MAX_SCENES}: use larger tiles")
     names = [name] if len(boxes) == 1 else [f"{name}-{k}" for k in range(1, len(boxes) + 1)]
     check_free(names, project, force)
-    heights = None if dem is None else ground_sampler(read_dem(dem), options.cell_m)
+    heights = None if dem is None else partial(town_ground, read_dem(dem), options.cell_m)
     wide, high = _MARGIN_DEG, _MARGIN_DEG / 2
     maps = read_maps(extract, [(w - wide, s - high, e + wide, n + high) for w, s, e, n in boxes])
     towns = []
-    for one, box, found in zip(names, boxes, maps, strict=True):
-        town, summary = town_plan(found, box, extract.name, options, heights)
+    for one, box, mapped in zip(names, boxes, maps, strict=True):
+        town, summary = town_plan(mapped, box, extract.name, options, heights)
         towns.append((one, town, tuple(_summary_lines(dict(summary)))))
     return [_write_place(one, town, project, notes) for one, town, notes in towns]
 
@@ -109,12 +110,11 @@ def _write_place(name: str, place: PlacePlan, project: Path, notes: tuple[str, .
         notes += (f"{placer.left_out:,} things left out: a scene has {MAX_NODES:,} instances at most",)
     make_project(project)
     heights = f"scenes/{name}{HEIGHTS_SUFFIX}"
-    if table is not None:
-        with atomic_file(project, heights) as path:
-            path.write_text(table.text(), encoding="ascii")
-    with atomic_file(project, f"scenes/{name}.toml") as path:
-        path.write_text(text, encoding="utf-8")
-    for left in (f"scenes/{name}.glb", *([heights] if table is None else [])):
+    files = {} if table is None else {heights: table.text()}
+    for file, content in (files | {f"scenes/{name}.toml": text}).items():
+        with atomic_file(project, file) as path:
+            path.write_text(content, encoding="utf-8")
+    for left in {f"scenes/{name}.glb", heights} - files.keys():
         (project / left).unlink(missing_ok=True)
     return AddedPlace(name, scene, project / "scenes" / f"{name}.toml", project / PIPELINE, notes)
 
@@ -125,8 +125,7 @@ def _summary_lines(counts: dict[str, int]) -> list[str]:
         f"{n:,} {key}" for key in ("buildings", "streets", "paths", "things of the map") if (n := counts.pop(key, 0))
     ]
     by = {"height": "by their height", "levels": "by their levels", "rule": "by rule, without either"}
-    known = [f"{n:,} {word}" for key, word in by.items() if (n := counts.pop(key, 0))]
+    sources = [f"{n:,} {word}" for key, word in by.items() if (n := counts.pop(key, 0))]
     lines = [", ".join(what) or "nothing that stands"]
-    if known:
-        lines.append(f"heights of buildings: {', '.join(known)}")
+    lines += [f"heights of buildings: {', '.join(sources)}"] if sources else []
     return lines + [f"{n:,} {key}" for key, n in sorted(counts.items())]

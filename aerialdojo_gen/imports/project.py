@@ -9,6 +9,15 @@ from aerialdojo_gen.pipeline.registry import STAGES
 from aerialdojo_gen.store.atomic import atomic_file, make_folder
 
 PIPELINE = "pipeline.toml"
+_PIPELINE = """\
+# Scenes of our own.
+name = "{name}"
+seed = 0
+scenes = ["*"]
+recipes = "scenes"
+annotations = "annotations"
+stages = {stages}
+"""
 
 
 def make_project(project: Path) -> None:
@@ -18,15 +27,6 @@ def make_project(project: Path) -> None:
     if (project / PIPELINE).exists():
         return
     name = "".join(c if c.isalnum() or c in "._-" else "-" for c in project.resolve().name).strip("._-") or "scenes"
-    stages = [stage.name for stage in STAGES if stage.name != "render"]
-    lines = [
-        "# Scenes of our own.",
-        f'name = "{name}"',
-        "seed = 0",
-        'scenes = ["*"]',
-        'recipes = "scenes"',
-        'annotations = "annotations"',
-        f"stages = {json.dumps(stages)}",
-    ]
+    stages = json.dumps([stage.name for stage in STAGES if stage.name != "render"])
     with atomic_file(project, PIPELINE) as path:
-        path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        path.write_text(_PIPELINE.format(name=name, stages=stages), encoding="utf-8")

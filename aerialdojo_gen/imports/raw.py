@@ -73,6 +73,12 @@ class RawNode:
         return replace(self, vertices=vertices, faces=self.faces if faces is None else faces)
 
 
+def bounds_of(bodies: Sequence[RawNode]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Lower and upper corner of bodies, (3,) each; all are finite."""
+    points = np.concatenate([b.vertices for b in bodies])
+    return points.min(axis=0), points.max(axis=0)
+
+
 def extract_faces(body: RawNode, rows: NDArray[np.int64] | NDArray[np.bool_]) -> RawNode:
     """Extract faces as a node with only the vertices they need."""
     used, faces = np.unique(body.faces[rows], return_inverse=True)

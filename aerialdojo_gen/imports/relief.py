@@ -198,8 +198,10 @@ def relief_plan(dem: Dem, options: ReliefOptions) -> tuple[PlacePlan, list[str]]
     surfaces["rock_slope"] = _ROCK_SLOPE
     if frame is None:
         origin = {"x_m": round(middle[0], 3), "y_m": round(middle[1], 3)}
+        where = f"({middle[0]:,.2f}, {middle[1]:,.2f}) of the model"
     else:
         origin = {"lon_deg": round(frame.lon_deg, 7), "lat_deg": round(frame.lat_deg, 7)}
+        where = f"{frame.lat_deg:.6f} N, {frame.lon_deg:.6f} E"
     plan = {
         "plan": 1, "seed": options.seed, "size_m": list(size),
         "ceiling_m": float(math.ceil(top + _HEADROOM_M)) if options.ceiling_m is None else options.ceiling_m,
@@ -214,12 +216,7 @@ def relief_plan(dem: Dem, options: ReliefOptions) -> tuple[PlacePlan, list[str]]
     notes = [
         f"heights every {cell:g} m ({2 * round(size[0] / cell) * round(size[1] / cell):,} triangles), "
         f"z = 0 is {table.datum_m:g} m, the highest point {top:.1f} m over it",
-        "x east, y north, metres about "
-        + (
-            f"{frame.lat_deg:.6f} N, {frame.lon_deg:.6f} E"
-            if frame
-            else f"({middle[0]:,.2f}, {middle[1]:,.2f}) of the model"
-        ),
+        f"x east, y north, metres about {where}",
     ]
     missing = int(np.isnan(dem.heights_m).sum())
     if missing:
@@ -247,13 +244,9 @@ def _place(dem: Dem, options: ReliefOptions) -> tuple[LocalFrame | None, tuple[f
     return None, middle, size or (east - west, north - south)
 
 
-def ground_sampler(dem: Dem, cell_m: float | None = None) -> Callable[[LocalFrame, tuple[float, float]], HeightTable]:
-    """Make the function that samples a town's ground: ``(frame, size_m) -> table``."""
-
-    def heights(frame: LocalFrame, size: tuple[float, float]) -> HeightTable:
-        cell = round(choose_cell(size, cell_m, native_cell_m(dem, frame)), 4)
-        # Whole cells that cover the site: a town keeps the size of its bounding box.
-        cover = tuple(math.ceil(s / cell / 2 - 1e-9) * 2 * cell for s in size)
-        return HeightTable.of(grid(dem, (cover[0], cover[1]), cell, frame, (0.0, 0.0)), cell)
-
-    return heights
+def town_ground(dem: Dem, cell_m: float | None, frame: LocalFrame, size: tuple[float, float]) -> HeightTable:
+    """Sample a town's ground."""
+    cell = round(choose_cell(size, cell_m, native_cell_m(dem, frame)), 4)
+    # Whole cells that cover the site: a town keeps the size of its bounding box.
+    wide, deep = (math.ceil(s / cell / 2 - 1e-9) * 2 * cell for s in size)
+    return HeightTable.of(grid(dem, (wide, deep), cell, frame, (0.0, 0.0)), cell)

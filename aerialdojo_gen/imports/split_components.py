@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
+from itertools import chain, product
 
 import numpy as np
 import scipy.ndimage
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.geometry.columns import Plan, lowest_of
 from aerialdojo_gen.imports.cutting import connected_bodies
-from aerialdojo_gen.imports.raw import RawNode, extract_faces, merge_nodes
+from aerialdojo_gen.imports.raw import RawNode, bounds_of, extract_faces, merge_nodes
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -63,8 +64,7 @@ class SplitStats:
 def split_components(bodies: Sequence[RawNode]) -> tuple[list[RawNode], SplitStats]:
     """Segment unstructured meshes (z up, metres) into things; nodes that are single things stay whole."""
     stats = SplitStats()
-    low = np.min([b.vertices.min(axis=0) for b in bodies], axis=0)
-    high = np.max([b.vertices.max(axis=0) for b in bodies], axis=0)
+    low, high = bounds_of(bodies)
     out: list[RawNode] = []
     for body in bodies:
         pieces = _connected(body)
@@ -85,9 +85,8 @@ def split_components(bodies: Sequence[RawNode]) -> tuple[list[RawNode], SplitSta
                 ground_bodies += [ground] if len(ground.faces) else []
                 things += attached
             elif (np.ptp(piece.vertices[:, :2], axis=0) > _WIDE_M).any() and ((kind := _materials(piece)) > 0).any():
-                parts = [
-                    p for k in np.unique(kind) for p in _connected(extract_faces(piece, np.flatnonzero(kind == k)))
-                ]
+                same = (extract_faces(piece, np.flatnonzero(kind == k)) for k in np.unique(kind))
+                parts = [part for one in same for part in _connected(one)]
                 stats.materials += len(parts)
                 things += parts
             else:
@@ -99,12 +98,8 @@ def split_components(bodies: Sequence[RawNode]) -> tuple[list[RawNode], SplitSta
 
 
 def _connected(body: RawNode) -> list[RawNode]:
+    """Split a body into its connected pieces, in the order of their first faces."""
     label, _ = connected_bodies(body.faces, len(body.vertices))
-    return _split(body, label)
-
-
-def _split(body: RawNode, label: Ints) -> list[RawNode]:
-    """Split faces by label, in the order of their first faces."""
     order = np.argsort(label, kind="stable")
     cuts = np.flatnonzero(np.diff(label[order])) + 1
     groups = sorted((np.sort(rows) for rows in np.split(order, cuts) if len(rows)), key=lambda rows: int(rows[0]))
@@ -146,20 +141,15 @@ def _ground_and_things(body: RawNode) -> tuple[RawNode, list[RawNode]]:
         return body, []
     label, _ = connected_bodies(body.faces[raised], len(body.vertices))
     rows = np.flatnonzero(raised)
-    things = []
-    for k in range(int(label.max()) + 1):
-        own = rows[label == k]
-        if len(own) and _is_thing(body, own):
-            things.append(own)
-    taken = np.zeros(len(body.faces), dtype=np.bool_)
-    for own in things:
-        taken[own] = True
-    return extract_faces(body, np.flatnonzero(~taken)), [extract_faces(body, own) for own in things]
+    things = [own for k in range(int(label.max()) + 1) if _is_thing(body, own := rows[label == k])]
+    rest = np.ones(len(body.faces), dtype=np.bool_)
+    rest[np.concatenate([np.zeros(0, np.int64), *things])] = False
+    return extract_faces(body, np.flatnonzero(rest)), [extract_faces(body, own) for own in things]
 
 
 def _floor(body: RawNode) -> tuple[Floats, Plan]:
     """Bare ground heights on a lattice: openings remove what is narrow and high."""
-    low, high = body.vertices[:, :2].min(axis=0), body.vertices[:, :2].max(axis=0)
+    low, high = (corner[:2] for corner in bounds_of([body]))
     step = max(_CELL_M, float(np.sqrt(np.prod(high - low) / _MAX_CELLS)))
     plan = Plan.over(low, high, step)
     surface = lowest_of(body.vertices[body.faces].reshape(-1, 9), plan)
@@ -241,6 +231,5 @@ def _cells(body: RawNode) -> Cells | None:
     spans = np.unique(np.column_stack([first, last]), axis=0)
     if ((spans[:, 2] - spans[:, 0] + 1) * (spans[:, 3] - spans[:, 1] + 1)).sum() > _MAX_MAPPED:
         return None
-    return frozenset(
-        (i, j) for x0, y0, x1, y1 in spans.tolist() for i in range(x0, x1 + 1) for j in range(y0, y1 + 1)
-    )
+    blocks = (product(range(x0, x1 + 1), range(y0, y1 + 1)) for x0, y0, x1, y1 in spans.tolist())
+    return frozenset(chain.from_iterable(blocks))

@@ -33,11 +33,11 @@ _GROUND = (122, 132, 108)
 
 def find_domes(bodies: Sequence[RawNode], table_names: Sequence[str]) -> list[int]:
     """Find sky domes, largest first: large hollow shells that enclose everything else."""
-    found: list[int] = []
+    domes: list[int] = []
     low = np.array([b.vertices.min(axis=0) for b in bodies])
     high = np.array([b.vertices.max(axis=0) for b in bodies])
     for k in np.argsort(-np.prod(high - low, axis=1), kind="stable").tolist():
-        rest = [j for j in range(len(bodies)) if j != k and j not in found]
+        rest = [j for j in range(len(bodies)) if j != k and j not in domes]
         if not rest:
             break
         words = [word for word in words_in(bodies[k].name) if word not in word_list("sky_perhaps")]
@@ -49,10 +49,13 @@ def find_domes(bodies: Sequence[RawNode], table_names: Sequence[str]) -> list[in
         size, inner = high[k] - low[k], inner_high - inner_low
         encloses = (low[k, :2] <= inner_low[:2] + 1e-6).all() and (high[k] >= inner_high - 1e-6).all()
         large = (size[:2] >= wider * inner[:2]).all() and (sky or size[:2].min() >= _LARGE_M)
-        if not (encloses and large and _is_hollow(bodies[k]) and _covers_above(bodies[k], inner_low, inner_high)):
+        if not (encloses and large and _is_hollow(bodies[k])):
             break
-        found.append(k)
-    return found
+        caster = TriangleRayCaster(bodies[k].vertices, bodies[k].faces.astype(np.int32))
+        if _vertical_hits(caster, inner_low, inner_high, inner_high[2] - 1e-6, 1.0, 12) < _ROOFED:
+            break
+        domes.append(k)
+    return domes
 
 
 def _is_hollow(body: RawNode) -> bool:
@@ -63,12 +66,6 @@ def _is_hollow(body: RawNode) -> bool:
     foot, height = np.array([*middle[:2], low[2]]), np.array([*reach[:2], high[2] - low[2]])
     shares = [(np.abs((centres - m) / r).max(axis=1) >= _HOLLOW).mean() for m, r in ((middle, reach), (foot, height))]
     return bool(max(shares) > _SHELL)
-
-
-def _covers_above(body: RawNode, low: Floats, high: Floats) -> bool:
-    """Whether vertical rays from the top of a box hit the body."""
-    caster = TriangleRayCaster(body.vertices, body.faces.astype(np.int32))
-    return _vertical_hits(caster, low, high, high[2] - 1e-6, 1.0, 12) >= _ROOFED
 
 
 def _vertical_hits(caster: TriangleRayCaster, low: Floats, high: Floats, z: float, way: float, n: int) -> float:

@@ -67,12 +67,10 @@ def _material(data: bytes, start: int, end: int) -> tuple[str, tuple[int, int, i
         elif kind == _DIFFUSE:
             for inner, first, _ in _chunks(data, a, b):
                 if inner == _RGB_BYTE:
-                    red, green, blue = data[first], data[first + 1], data[first + 2]
-                    colour = red, green, blue
+                    colour = struct.unpack_from("<3B", data, first)
                 elif inner == _RGB_FLOAT:
-                    red, green, blue = (
-                        round(255 * min(max(c, 0.0), 1.0)) for c in struct.unpack_from("<3f", data, first)
-                    )
+                    light = struct.unpack_from("<3f", data, first)
+                    red, green, blue = (round(255 * min(max(c, 0.0), 1.0)) for c in light)
                     colour = red, green, blue
     return name, colour
 

@@ -135,15 +135,11 @@ def mismatch(path: Path, suffixes: tuple[str, ...]) -> str:
     suffix = path.suffix.lower()
     for begin, own in _MESHES:
         if head.startswith(begin) and suffix != own:
-            return _rename(path, own, suffixes)
+            kind, right = own[1:].upper(), path.with_suffix(own).name
+            if own in suffixes:
+                return f"is a {kind} file by its content: rename it to {right}"
+            return f"is a {kind} file, which is not read: export it as GLB"
     point_cloud = (
         suffix == ".ply" and b"element vertex" in head and b"end_header" in head and b"element face" not in head
     )
     return "holds points and no faces: mesh it first (CloudCompare, Open3D, MeshLab)" if point_cloud else ""
-
-
-def _rename(path: Path, own: str, suffixes: tuple[str, ...]) -> str:
-    kind = own[1:].upper()
-    if own not in suffixes:
-        return f"is a {kind} file, which is not read: export it as GLB"
-    return f"is a {kind} file by its content: rename it to {path.with_suffix(own).name}"

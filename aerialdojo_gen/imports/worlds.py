@@ -11,7 +11,7 @@ import pyarrow as pa
 import pyarrow.csv
 
 from aerialdojo_gen.annotations.draft import DraftOptions
-from aerialdojo_gen.base.config.pipeline import Pipeline, load_pipeline
+from aerialdojo_gen.base.config.pipeline import load_pipeline
 from aerialdojo_gen.base.errors import AerialDojoError, AssetError, UsageError
 from aerialdojo_gen.base.names import choose_scenes
 from aerialdojo_gen.base.safe_parse import read_toml
@@ -26,7 +26,6 @@ from aerialdojo_gen.pipeline.registry import BY_NAME
 from aerialdojo_gen.pipeline.stage import Job, ProjectPaths
 from aerialdojo_gen.pipeline.task import Task, compute
 from aerialdojo_gen.scenes.catalogue import load_catalogue
-from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.scenes.worlds.kinds import type_names
 from aerialdojo_gen.scenes.worlds.make import make_world
 from aerialdojo_gen.scenes.worlds.world import MAX_SEED, World
@@ -71,8 +70,8 @@ def vary(
     """
     options = options or VaryOptions({})
     names = choose_scenes(list(types), type_names(home() / "scene_assets"), "type")
-    if count(names, seeds) > _MAX_WORLDS:
-        raise UsageError(f"{count(names, seeds):,} worlds are asked for, at most {_MAX_WORLDS:,} are made at once")
+    if (n := count(names, seeds)) > _MAX_WORLDS:
+        raise UsageError(f"{n:,} worlds are asked for, at most {_MAX_WORLDS:,} are made at once")
     worlds = [World(name, seed, options.knobs, options.held_out) for name in names for seed in seeds]
     names_of = {world.name: k for k, world in enumerate(worlds)}
     make_project(project)
@@ -129,16 +128,12 @@ def _write_world(work: _Work) -> VariedWorld:
     pipeline = _pipeline(project / PIPELINE)
     folders = (home() / "scene_assets", project / "scenes", project / "annotations")
     paths = ProjectPaths(open_root(project / DATA), *folders)
-    _write_mesh(made.scene, pipeline, paths)
+    # The work of `build-scenes` on a scene that is built: a run finds it fresh while the plan stays as it is.
+    job = Job(_BUILD.name, world.name, 0, 1, pipeline.seed, pipeline.embodiment, paths, built=made.scene)
+    compute(Task(job, pipeline.section(_BUILD.name), scene_fingerprint(_BUILD, pipeline, paths, world.name)))
     draft = DraftOptions(n_objects=options.n_objects, seed=world.seed)
     draft_scene(world.name, pipeline, paths, draft, force=True, scene=made.scene)
     return VariedWorld(world.name, made=True, refused=made.refused)
-
-
-def _write_mesh(scene: Scene, pipeline: Pipeline, paths: ProjectPaths) -> None:
-    """Do the work of `build-scenes` on a scene that is built: a run finds it fresh while the plan stays as it is."""
-    job = Job(_BUILD.name, scene.name, 0, 1, pipeline.seed, pipeline.embodiment, paths, built=scene)
-    compute(Task(job, pipeline.section(_BUILD.name), scene_fingerprint(_BUILD, pipeline, paths, scene.name)))
 
 
 def _check_same(world: World, plan: Path) -> None:

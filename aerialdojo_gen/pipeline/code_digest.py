@@ -48,7 +48,7 @@ BY_NAME: dict[str, tuple[str, ...]] = {
     "learning.training": ("torch",),
     "pipeline.stage": (),
     "rendering.gl": ("moderngl",),
-    "scenes.worlds.types": ("scenes.worlds.types.*",),
+    "scenes.worlds.make": ("scenes.worlds.types.*",),
     "scenes.builders": ("scenes.builders.*",),
     "scenes.kit": ("scenes.kit.*",),
 }

@@ -1,7 +1,7 @@
 """add-terrain: heights as the model has them, by another interpolation, and one line for each fault of a file."""
 
+import re
 import shutil
-import sys
 import zipfile
 
 import numpy as np
@@ -10,7 +10,7 @@ from scipy.interpolate import RegularGridInterpolator
 from support import maps
 from support.layout_checks import ASSETS, catalogue
 
-from aerialdojo_gen.base.errors import AssetError, MissingPackage, UsageError
+from aerialdojo_gen.base.errors import AssetError, UsageError
 from aerialdojo_gen.imports.dem import read_dem
 from aerialdojo_gen.imports.places import add_terrain
 from aerialdojo_gen.imports.relief import ReliefOptions
@@ -103,10 +103,9 @@ def test_the_heights_lie_beside_the_plan_and_count_as_its_source(hill, tmp_path)
     }
     for said, wrong in faults.items():
         table.write_text(wrong)
-        with pytest.raises(AssetError, match=said) as found:
+        place_of = re.escape(f"{place.recipe}: [ground] steps[0] 'surveyed_heights': ")
+        with pytest.raises(AssetError, match=rf"^{place_of}[^\n]*{said}[^\n]*\Z"):
             build_scene(place.recipe, catalogue())
-        assert str(found.value).startswith(f"{place.recipe}: [ground] steps[0] 'surveyed_heights': ")
-        assert "\n" not in str(found.value)
     table.unlink()
     with pytest.raises(AssetError, match=r"Hill\.heights\.asc cannot be read .*: it belongs beside the plan"):
         build_scene(place.recipe, catalogue())
@@ -143,14 +142,26 @@ def tif(folder, z=None, crs="EPSG:4326", dx=1e-5, nodata=None):
     return maps.write_geotiff(folder / "x.tif", z, crs, 24.9, 60.2, dx, dx, nodata)
 
 
-def nothing(folder):
-    return tif(folder, np.full((9, 9), -5.0), nodata=-5.0)
+def cut(path, end):
+    """A file of the same name without its end."""
+    path.write_bytes(path.read_bytes()[:end])
+    return path
+
+
+def asc(folder, head, numbers):
+    (folder / "x.asc").write_text(f"{head}xllcorner 0\nyllcorner 0\ncellsize 1\n{numbers}\n")
+    return folder / "x.asc"
+
+
+def npz(folder):
+    np.savez(folder / "x.npz", heights_m=np.zeros((4, 4)), cell_m=1.0)
+    return folder / "x.npz"
 
 
 @pytest.mark.parametrize(
     ("make", "options", "said"),
     [
-        (nothing, {}, "contains no heights: every cell is nodata"),
+        (lambda d: tif(d, np.full((9, 9), -5.0), nodata=-5.0), {}, "contains no heights: every cell is nodata"),
         (lambda d: tif(d, crs=""), {}, "has no coordinate system"),
         (lambda d: tif(d, crs="EPSG:2263", dx=2.0), {}, "not in metres or degrees"),  # feet
         (lambda d: tif(d, dx=1e-3), {}, "--size 400 400 crops to its centre"),
@@ -158,46 +169,22 @@ def nothing(folder):
         (lambda d: tif(d, dx=5e-5), {"cell_m": 0.3}, "take cells of"),
         (lambda d: d / "none.tif", {}, "No such file"),
         (lambda d: d / "x.png", {}, "a height model is a file .tif"),
+        # Cut short, or with sizes that are none.
+        *((lambda d, end=end: cut(tif(d), end), {}, "as a GeoTIFF, or is cut short") for end in (0, 60, 7000)),
+        (lambda d: cut(npz(d), 80), {}, "x.npz cannot be read"),
+        (lambda d: asc(d, "ncols 4\nnrows 4\n", "1 2 3"), {}, "says 4 by 4 heights and has 3: is it truncated"),
+        (lambda d: asc(d, "ncols inf\nnrows 4\n", "1 2 3 4"), {}, "is not an ESRI ASCII grid"),
+        (lambda d: asc(d, "ncols -2\nnrows -2\n", "1 2 3 4"), {}, "is not an ESRI ASCII grid"),
     ],
 )
 def test_a_fault_is_one_line(make, options, said, tmp_path):
-    with pytest.raises((AssetError, UsageError)) as found:
+    with pytest.raises((AssetError, UsageError), match=rf"^[^\n]*{said}[^\n]*\Z"):
         add_terrain("X", make(tmp_path), tmp_path / "mine", ReliefOptions(**options))
-    assert said in str(found.value)
-    assert "\n" not in str(found.value)
     assert not (tmp_path / "mine" / "scenes").exists()
 
 
-def asc(head, numbers):
-    return f"{head}xllcorner 0\nyllcorner 0\ncellsize 1\n{numbers}\n".encode()
-
-
-def cut_npz(folder):
-    np.savez(folder / "whole.npz", heights_m=np.zeros((4, 4)), cell_m=1.0)
-    return (folder / "whole.npz").read_bytes()[:80]
-
-
-@pytest.mark.parametrize(
-    ("name", "content", "said"),
-    [
-        *(("x.tif", lambda d, part=part: tif(d).read_bytes()[:part], "as a GeoTIFF, or is cut short")
-          for part in (0, 60, 7000)),
-        ("x.npz", cut_npz, "x.npz cannot be read"),
-        ("x.asc", asc("ncols 4\nnrows 4\n", "1 2 3"), "says 4 by 4 heights and has 3: is it truncated"),
-        ("x.asc", asc("ncols inf\nnrows 4\n", "1 2 3 4"), "is not an ESRI ASCII grid"),
-        ("x.asc", asc("ncols -2\nnrows -2\n", "1 2 3 4"), "is not an ESRI ASCII grid"),
-    ],
-)  # fmt: skip
-def test_a_file_cut_short_or_with_sizes_that_are_none_is_one_line(name, content, said, tmp_path):
-    raw = content if isinstance(content, bytes) else content(tmp_path)
-    (tmp_path / name).write_bytes(raw)
-    with pytest.raises(AssetError, match=said):
-        read_dem(tmp_path / name)
-
-
 def test_heights_that_are_no_numbers_are_none(tmp_path):
-    (tmp_path / "x.asc").write_bytes(asc("ncols 2\nnrows 2\n", "1 inf 1e300 nan"))
-    assert np.nanmax(read_dem(tmp_path / "x.asc").heights_m) == 1.0
+    assert np.nanmax(read_dem(asc(tmp_path, "ncols 2\nnrows 2\n", "1 inf 1e300 nan")).heights_m) == 1.0
 
 
 def test_a_geotiff_is_no_way_to_other_files(tmp_path):
@@ -233,10 +220,3 @@ def test_a_files_name_cannot_write_into_the_recipe(hill, tmp_path):
     shutil.copy(hill, odd)
     place = add_terrain("Odd", odd, tmp_path / "mine", ReliefOptions(bare=True))
     assert place.recipe.read_text().startswith("# Made by add-terrain of hill?layout = 'yard'?.npz: ")
-
-
-def test_without_rasterio_it_says_what_to_install(tmp_path, monkeypatch):
-    path = tif(tmp_path)
-    monkeypatch.setitem(sys.modules, "rasterio", None)
-    with pytest.raises(MissingPackage, match=r"lacks the package rasterio: pip install 'aerialdojo-gen\[maps\]'"):
-        read_dem(path)

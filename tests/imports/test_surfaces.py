@@ -136,27 +136,22 @@ def test_what_stands_out_of_one_surface_becomes_things(seed):
 
 
 def test_bare_hills_are_not_taken_apart():
-    field = hills(7, cells=30, relief_m=14.0)
-    bodies, told = split_components([raw(field.mesh())])
+    bodies, told = split_components([raw(hills(7, cells=30, relief_m=14.0).mesh())])
     assert (len(bodies), told.attached) == (1, 0)
 
 
 def test_a_fence_does_not_swallow_what_it_stands_around_and_a_house_has_its_chimney():
-    fence = trimesh.util.concatenate(
-        [trimesh.creation.box(bounds=b) for b in (
-            [[0, 0, 0], [40, 0.4, 9]], [[0, 39.6, 0], [40, 40, 9]], [[0, 0.3, 0], [0.4, 39.7, 9]],
-            [[39.6, 0.3, 0], [40, 39.7, 9]])]
+    corners = (
+        [[0, 0, 0], [40, 0.4, 9]], [[0, 39.6, 0], [40, 40, 9]], [[0, 0.3, 0], [0.4, 39.7, 9]],
+        [[39.6, 0.3, 0], [40, 39.7, 9]], [[15, 15, 0], [25, 24, 6]], [[16, 16, 6], [20, 20, 8.9]],
+        [[60, 10, 0], [66, 16, 20]], [[62, 12, 20], [63, 13, 20.2]],
     )  # fmt: skip
+    *sides, house, roof, tower, hatch = (trimesh.creation.box(bounds=both) for both in corners)
+    fence = trimesh.util.concatenate(sides)
     ring = trimesh.creation.annulus(18, 20, 9).apply_translation([20, 20, 4.5])
-    house = trimesh.creation.box(bounds=[[15, 15, 0], [25, 24, 6]])
-    roof = trimesh.creation.box(bounds=[[16, 16, 6], [20, 20, 8.9]])
-    tower = trimesh.creation.box(bounds=[[60, 10, 0], [66, 16, 20]])
-    hatch = trimesh.creation.box(bounds=[[62, 12, 20], [63, 13, 20.2]])
-    soup = trimesh.util.concatenate([ring, house, roof, tower, hatch])
-    bodies, told = split_components([raw(soup)])
+    bodies, told = split_components([raw(trimesh.util.concatenate([ring, house, roof, tower, hatch]))])
     assert told.pieces == 5
-    sizes = sorted(len(b.faces) for b in bodies)
-    assert sizes == sorted([len(ring.faces), 12, 12, 24])
+    assert sorted(len(b.faces) for b in bodies) == sorted([len(ring.faces), 12, 12, 24])
     assert len(split_components([raw(fence, "Fence"), raw(house, "House")])[0]) == 2
 
 

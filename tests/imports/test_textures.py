@@ -43,11 +43,14 @@ def thing(scene: Scene, category: str):
     return found
 
 
+def imported(path: Path, **options) -> Scene:
+    return import_mesh("Mine", read_here(path), MeshOptions(**options))[0]
+
+
 @pytest.fixture(scope="module")
 def yard(tmp_path_factory) -> Scene:
     folder = tmp_path_factory.mktemp("yard")
-    nodes = read_here(textured.yard(folder / "yard.glb"))
-    return stored(import_mesh("Yard", nodes, MeshOptions(light="sun"))[0], folder / "scene.glb")
+    return stored(imported(textured.yard(folder / "yard.glb"), light="sun"), folder / "scene.glb")
 
 
 @pytest.fixture(scope="module")
@@ -59,8 +62,7 @@ def board(tmp_path_factory) -> Scene:
     out.node("Wall", textured.WALL, textured.WALL_FACES, paint, textured.WALL_UV)
     ground = np.array([[-30.0, -30, 0], [30, -30, 0], [30, 30, 0], [-30, 30, 0]])
     out.node("Ground", ground, textured.WALL_FACES, out.material(factor=[0.2, 0.25, 0.15, 1]))
-    nodes = read_here(out.write(folder / "board.glb"))
-    return stored(import_mesh("Board", nodes, MeshOptions(light="baked"))[0], folder / "scene.glb")
+    return stored(imported(out.write(folder / "board.glb"), light="baked"), folder / "scene.glb")
 
 
 @pytest.mark.parametrize("renderer", RENDERERS)
@@ -131,9 +133,8 @@ def test_a_dome_is_drawn_as_it_is_behind_everything_and_changes_nothing_else(ren
 def test_vertex_colours_run_over_a_face(yard):
     stone = thing(yard, "stone")
     assert stone.attributes["colour"] in ("purple and yellow", "yellow and purple", "pink and yellow")
-    pose = look_at_pose(stone.centroid - (0, 4, 0), stone.centroid)
     with GlRenderer(yard) as camera:
-        rgb = camera.render(CAMERA, pose).rgb
+        rgb = camera.render(CAMERA, look_at_pose(stone.centroid - (0, 4, 0), stone.centroid)).rgb
     column = rgb[100:157, 128].astype(int)
     # From yellow at the top to purple at the bottom, a little at a time.
     assert (np.diff(column[:, 1]) <= 0).all()
@@ -144,8 +145,7 @@ def test_words_for_colours_are_what_textures_show(yard):
     truck = thing(yard, "truck")
     assert truck.attributes["colour"] == "blue and white"
     shares = colour_shares(truck, yard.materials)
-    assert shares["blue"] == pytest.approx(0.5, abs=0.05)
-    assert shares["white"] == pytest.approx(0.5, abs=0.05)
+    assert [shares["blue"], shares["white"]] == pytest.approx([0.5, 0.5], abs=0.05)
     assert unsupported_colours("blue and white", truck, yard.materials) == []
     assert unsupported_colours("red", truck, yard.materials) == ["red"]
     assert thing(yard, "hedge").attributes["colour"] == "green"
@@ -176,7 +176,7 @@ def test_a_map_shows_both_sides_alike_and_no_stipples(yard):
 def test_a_scene_comes_back_from_its_file_to_the_bit_and_twice_the_same(tmp_path):
     made = set()
     for k in range(2):
-        scene, _ = import_mesh("Yard", read_here(textured.yard(tmp_path / f"{k}.glb")))
+        scene = imported(textured.yard(tmp_path / f"{k}.glb"))
         back = stored(scene, tmp_path / "scene.glb")
         write_glb(back, tmp_path / "again.glb")
         made |= {(tmp_path / name).read_bytes() for name in ("scene.glb", "again.glb")}
@@ -220,7 +220,7 @@ def test_a_scans_jpeg_is_taken_as_it_is_stored_however_the_camera_was_held(tmp_p
     exif = b"Exif\0\0" + tiff
     turned = turned[:2] + b"\xff\xe1" + (2 + len(exif)).to_bytes(2, "big") + exif + turned[2:]
     (tmp_path / "scan.jpg").write_bytes(turned)
-    scene, _ = import_mesh("Scan", read_here(path))
+    scene = imported(path)
     mine = texture_of(scene).texture
     assert mine.shape == (64, 128, 3)
     np.testing.assert_array_equal(mine, texture_of(stored(scene, tmp_path / "s.glb")).texture)
@@ -229,8 +229,7 @@ def test_a_scans_jpeg_is_taken_as_it_is_stored_however_the_camera_was_held(tmp_p
 @pytest.mark.parametrize("kind", ["jpeg", "bmp"])
 def test_a_scene_that_asks_for_gigabytes_of_pixels_is_refused(kind, tmp_path, monkeypatch):
     """Scenes come from the Hub too: neither may a file of another kind pass for a small PNG."""
-    scene, _ = import_mesh("Scan", read_here(scan_of(tmp_path, texture_px=64)))
-    write_glb(scene, tmp_path / "s.glb")
+    write_glb(imported(scan_of(tmp_path, texture_px=64)), tmp_path / "s.glb")
     whole, jpeg = (tmp_path / "s.glb").read_bytes(), (tmp_path / "scan.jpg").read_bytes()
     if kind == "jpeg":
         at = jpeg.index(b"\xff\xc0") + 5
@@ -286,7 +285,7 @@ def test_ply_keeps_the_colours_of_its_vertices(tmp_path):
     paint = np.column_stack([255 * height, 80 * np.ones_like(height), 255 * (1 - height)])
     body.visual.vertex_colors = np.rint(paint).astype(np.uint8)
     body.export(tmp_path / "ball.ply")
-    scene, _ = import_mesh("Ball", read_here(tmp_path / "ball.ply"))
+    scene = imported(tmp_path / "ball.ply")
     (part,) = next(i for i in scene.instances if i.category != "ground").parts
     high = part.vertices[:, 2] / np.ptp(part.vertices[:, 2])
     np.testing.assert_allclose(part.colours[:, 0], 255 * high, atol=2.0)
@@ -330,8 +329,7 @@ def test_gltf_says_more_than_plain_triangles(tmp_path):
 )
 def test_bad_textures_are_told_and_the_mesh_stays(file, said):
     (surface,), _ = decode_surfaces([SourceMaterial("wall", (1.0, 0.0, 0.0), file)])
-    assert surface.texture is None
-    assert surface.colour == (255, 0, 0)
+    assert (surface.texture, surface.colour) == (None, (255, 0, 0))
     assert said in surface.notes[0]
 
 

@@ -26,9 +26,8 @@ from aerialdojo_gen.scenes.light import sun_at
 from aerialdojo_gen.scenes.materials import parse_colour
 from aerialdojo_gen.scenes.worlds.draft import Draft, NoRoomError
 from aerialdojo_gen.scenes.worlds.kinds import load_type, type_names
-from aerialdojo_gen.scenes.worlds.make import MAX_BYTES, MAX_DRAWS, make_world
+from aerialdojo_gen.scenes.worlds.make import MAX_BYTES, MAX_DRAWS, generator_of, make_world
 from aerialdojo_gen.scenes.worlds.paints import PAINTS, paintable
-from aerialdojo_gen.scenes.worlds.types import generator_of
 from aerialdojo_gen.scenes.worlds.world import World, world_of
 
 TYPES = type_names(ASSETS)

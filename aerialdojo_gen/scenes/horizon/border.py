@@ -63,14 +63,14 @@ def _pieces(part: Part, bounds: Floats, side: int) -> list[_Piece]:
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     corners = corners[normal[:, 2] > 0.05 * norm(normal)]
     on = np.abs(corners[:, :, across] - bounds[int(upper), across]) < _ON_M
-    found = []
+    pieces = []
     for a, b in ((0, 1), (1, 2), (2, 0)):
         rows = np.flatnonzero(on[:, a] & on[:, b])
         ends = np.stack([corners[rows, a], corners[rows, b]], axis=1)
         # Upward faces are counter-clockwise from above, and so is the way round: others are seams.
         along = (ends[:, 1, axis] - ends[:, 0, axis]) * way
-        found += [(float(one[0, axis] * way), one, part.material) for one in ends[along > _SHORT_M]]
-    return found
+        pieces += [(float(one[0, axis] * way), one, part.material) for one in ends[along > _SHORT_M]]
+    return pieces
 
 
 def _topmost(side: int, land: Sequence[_Piece], sheets: Sequence[_Piece]) -> list[_Piece]:
@@ -107,7 +107,7 @@ def _topmost(side: int, land: Sequence[_Piece], sheets: Sequence[_Piece]) -> lis
 
 def _joined(side: int, pieces: Sequence[_Piece]) -> list[Stretch]:
     axis, way, _ = _SIDES[side]
-    out: list[Stretch] = []
+    joined: list[tuple[list[Floats], str]] = []
     points: list[Floats] = []
     material, reached = "", -np.inf
     for start, ends, spec in pieces:
@@ -117,11 +117,8 @@ def _joined(side: int, pieces: Sequence[_Piece]) -> list[Stretch]:
         reached = end
         gap = points and np.abs(points[-1] - ends[0]).max() > _ON_M
         long = points and abs(points[-1][axis] - points[0][axis]) + (end - start) > _LONGEST_M
-        if points and (spec != material or gap or long):
-            out.append(Stretch(side, np.array(points), material))
-            points = []
-        material = spec
-        points += [ends[1]] if points else [ends[0], ends[1]]
-    if points:
-        out.append(Stretch(side, np.array(points), material))
-    return out
+        if spec != material or gap or long:
+            points, material = [ends[0]], spec
+            joined.append((points, material))
+        points.append(ends[1])
+    return [Stretch(side, np.array(points), material) for points, material in joined]

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.base.rng import generator, rank
+from aerialdojo_gen.geometry.soup import soup
 from aerialdojo_gen.scenes.catalogue import placed, single
 from aerialdojo_gen.scenes.horizon.border import border_of
 from aerialdojo_gen.scenes.horizon.kinds import kind_of
@@ -70,14 +70,6 @@ def _merged(parts: Sequence[Part]) -> tuple[Part, ...]:
     by_material: dict[str, list[Part]] = {}
     for part in parts:
         by_material.setdefault(part.material, []).append(part)
-    out = []
-    for some in by_material.values():
-        offsets = np.cumsum([0, *(len(part.vertices) for part in some[:-1])])
-        faces = [part.faces + np.int32(offset) for part, offset in zip(some, offsets, strict=True)]
-        out.append(
-            replace(
-                some[0], vertices=np.concatenate([p.vertices for p in some]), faces=np.concatenate(faces),
-                uv=np.concatenate([p.uv for p in some]),
-            )
-        )  # fmt: skip
-    return tuple(out)
+    return tuple(
+        Part(*soup(some), np.concatenate([p.uv for p in some]), material) for material, some in by_material.items()
+    )

@@ -48,9 +48,7 @@ KINDS: dict[str, Kind] = {
         near_m=6.0, hills_m=420, steep=True, far="rock:#8f8b86", trees_ha=40, trees=("spire",), wood=0.5,
         crowns=("needles", "needles:#46703e"),
     ),
-    "snow": Kind(
-        ground="snow", near_m=5.0, hills_m=170, steep=True, far="snow:#dde5ee", trees_ha=0, wood=0.0
-    ),
+    "snow": Kind(ground="snow", near_m=5.0, hills_m=170, steep=True, far="snow:#dde5ee", trees_ha=0, wood=0.0),
     "alps": Kind(
         ground="snow", near_m=7.0, hills_m=380, steep=True, far="snow:#dde5ee", trees_ha=60, trees=("spire",),
         wood=0.45, crowns=("needles:#3f5c46", "needles:#557062"), houses="cabins", houses_ha=0.7,
@@ -88,8 +86,5 @@ def kind_of(scene: str, head: HorizonHead) -> Kind | None:
     if name == "none":
         return None
     kind = KINDS[name]
-    if head.hills_m is not None:
-        kind = replace(kind, hills_m=head.hills_m)
-    if head.ground:
-        kind = replace(kind, ground=head.ground)
-    return kind
+    hills_m = kind.hills_m if head.hills_m is None else head.hills_m
+    return replace(kind, hills_m=hills_m, ground=head.ground or kind.ground)

@@ -117,8 +117,7 @@ def make_land(border: Sequence[Stretch], kind: Kind, top_m: float, noise: Noise)
     base = base_material(border, kind)
     strips = _Strips.of(border, base)
     grid = _positions(strips, noise)
-    z = _heights(strips, grid, kind, noise)
-    z = _welded(z)
+    z = _welded(_heights(strips, grid, kind, noise))
     vertices = np.concatenate([grid, z[..., None]], axis=-1)
     vertices[:, :, 0] = strips.foot
     parts = [*_quads(strips, vertices, kind, base, noise), *_inner(strips, vertices), *_walls(strips, vertices, base)]
@@ -139,9 +138,8 @@ def _positions(strips: _Strips, noise: Noise) -> Floats:
     # Opposite sides wind alike: what crosses the site goes on as it is.
     x, y = strips.way[:, :, None, 0], strips.way[:, :, None, 1]
     wind = noise(100.0 * (x * x - y * y) + RINGS_M, 200.0 * x * y + 0.0 * RINGS_M, 160.0, 3.0)
-    return np.asarray(
-        straight + across * (np.minimum(0.3 * RINGS_M, 50.0) * smooth(RINGS_M / 60.0) * wind)[..., None]
-    )
+    aside = np.minimum(0.3 * RINGS_M, 50.0) * smooth(RINGS_M / 60.0) * wind
+    return np.asarray(straight + across * aside[..., None])
 
 
 def _shore_distance(strips: _Strips, grid: Floats) -> Floats:
@@ -177,10 +175,9 @@ def _heights(strips: _Strips, grid: Floats, kind: Kind, noise: Noise) -> Floats:
         shore = _shore_distance(strips, grid)
         low = water + 0.25 + (np.maximum(land, water + 0.25) - water - 0.25) * smooth(shore / (_SHORE_M + 0.15 * d))
         land = land + (low - land) * smooth(d / _BLEND_M)
-        islands = (
-            np.maximum(noise(x, y, 700.0, 6.0) - 0.25, 0.0) * 1.6 * kind.hills_m * smooth((d - _ISLANDS_M) / 500.0)
-        )
-        return np.asarray(np.where(strips.water[:, None, None], z0 + islands, land))
+        islands = np.maximum(noise(x, y, 700.0, 6.0) - 0.25, 0.0) * 1.6 * kind.hills_m
+        islands = islands * smooth((d - _ISLANDS_M) / 500.0)
+        land = np.where(strips.water[:, None, None], z0 + islands, land)
     return np.asarray(land)
 
 
@@ -209,17 +206,17 @@ def _quads(strips: _Strips, v: Floats, kind: Kind, base: str, noise: Noise) -> l
         pick = noise(middle[:, 0], middle[:, 1], 45.0 + RINGS_M[r] / 3.0, 5.0)
         names, land = [], []
         for k, material in enumerate(strips.material):
-            natural = material == base or RINGS_M[r] >= reach[k]
-            name = material
+            natural = not strips.water[k] and (material == base or RINGS_M[r] >= reach[k])
             if strips.water[k]:
-                name, natural = (kind.far, False) if b[k, 2] > strips.foot[k, 0, 2] + 2.0 else (beyond[k], False)
-            elif natural:
-                name = base
-                if RINGS_M[r] >= 450.0:
-                    name = kind.far
-                elif kind.fields and RINGS_M[r] >= 45.0 and pick[k] > -0.2:
-                    name = kind.fields[int((pick[k] + 0.2) * 997.0) % len(kind.fields)]
-            names.append(name)
+                names.append(kind.far if b[k, 2] > strips.foot[k, 0, 2] + 2.0 else beyond[k])
+            elif not natural:
+                names.append(material)
+            elif RINGS_M[r] >= 450.0:
+                names.append(kind.far)
+            elif kind.fields and RINGS_M[r] >= 45.0 and pick[k] > -0.2:
+                names.append(kind.fields[int((pick[k] + 0.2) * 997.0) % len(kind.fields)])
+            else:
+                names.append(base)
             land.append(natural)
         faces = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
         out.append((faces, names * 2, np.tile(land, 2), np.tile(strips.water, 2)))

@@ -69,15 +69,15 @@ def scatter_scenery(
 ) -> Iterator[SceneryItem]:
     """Yield houses, then trees, until `budget` triangles are spent."""
     draws = _Draws(land, bounds, kind.wet)
-    houses: list[tuple[Floats, float]] = []
+    houses: list[tuple[float, float, float]] = []
     for thing, radius in _houses(draws, kind, rng):
         spent = sum(len(body.faces) for _, body in thing[0])
         if spent > budget * 0.8:
             break
         budget -= spent
-        houses.append((thing[1][:2], radius))
+        houses.append((*thing[1][:2], radius))
         yield thing
-    taken = np.array([(*xy, radius) for xy, radius in houses]).reshape(-1, 3)
+    taken = np.array(houses).reshape(-1, 3)
     for thing in _trees(draws, kind, noise, rng, taken):
         budget -= sum(len(body.faces) for _, body in thing[0])
         if budget < 0:
@@ -98,9 +98,8 @@ def _houses(draws: _Draws, kind: Kind, rng: np.random.Generator) -> Iterator[tup
         # Steep land, roads and water carry none.
         if not fit.all() or np.ptp(heights) > 0.35 * half or away < half + 3.0:
             continue
-        turn = float(rng.integers(4)) * np.pi / 2 + (
-            rng.uniform(-0.2, 0.2) if kind.houses in ("farms", "cabins") else 0.0
-        )
+        turn = float(rng.integers(4)) * np.pi / 2
+        turn += rng.uniform(-0.2, 0.2) if kind.houses in ("farms", "cabins") else 0.0
         yield (_house(kind.houses, size, rng), np.array([*at, float(heights.min())]), turn), half * 1.2
 
 
@@ -120,12 +119,10 @@ def _house(style: str, size: float, rng: np.random.Generator) -> list[tuple[str,
         "farms": (rng.uniform(10, 16), rng.uniform(7, 9), 3.0 * rng.integers(1, 3), rng.uniform(3.5, 5.0)),
         "cabins": (rng.uniform(8, 11), rng.uniform(7, 9), 3.0, rng.uniform(3.0, 4.5)),
     }[style]
-    roof = (
-        "#e8edf2" if style == "cabins" else "#777d80" if style == "sheds" else _ROOFS[int(rng.integers(len(_ROOFS)))]
-    )
+    roof = {"cabins": "#e8edf2", "sheds": "#777d80"}.get(style) or _ROOFS[int(rng.integers(len(_ROOFS)))]
     out = [(walls, _walls(w, d, high, rise)), (roof, _gable(w, d, high, rise))]
     if style == "sheds" and rng.uniform() < 0.2:
-        out.append(("#8f5a48", _turned([(1.4, -_ROOT_M), (1.4 * 0.7, rng.uniform(22, 34))], 6, None)))
+        out.append(("#8f5a48", _turned(6, (1.4, -_ROOT_M), (1.4 * 0.7, rng.uniform(22, 34)))))
     return out
 
 
@@ -156,7 +153,7 @@ def _gable(w: float, d: float, high: float, rise: float) -> Mesh:
 
 
 @lru_cache(maxsize=64)
-def _rings(profile: tuple[tuple[float, float], ...], sides: int, tip: float | None, twist: float) -> Mesh:
+def _turned(sides: int, *profile: tuple[float, float], tip: float | None = None, twist: float = 0.0) -> Mesh:
     v: list[tuple[float, float, float]] = []
     for k, (r, z) in enumerate(profile):
         angle = 2 * np.pi * (np.arange(sides) + 0.5 * (k % 2)) / sides + twist
@@ -172,10 +169,6 @@ def _rings(profile: tuple[tuple[float, float], ...], sides: int, tip: float | No
         top = (len(profile) - 1) * sides
         f += [(top + n, top + (n + 1) % sides, len(v) - 1) for n in range(sides)]
     return mesh(v, f)
-
-
-def _turned(profile: list[tuple[float, float]], sides: int, tip: float | None, twist: float = 0.0) -> Mesh:
-    return _rings(tuple(profile), sides, tip, twist)
 
 
 def _trees(draws: _Draws, kind: Kind, noise: Noise, rng: np.random.Generator, taken: Floats) -> Iterator[SceneryItem]:
@@ -202,23 +195,22 @@ def _trees(draws: _Draws, kind: Kind, noise: Noise, rng: np.random.Generator, ta
 def _tree(species: str, crown: str, draw: float, near: bool) -> list[tuple[str, Mesh]]:
     if species == "scrub":
         high = 0.8 + 1.6 * draw
-        return [(crown, _turned([(high * 0.6, -0.2), (high * 0.75, high * 0.5)], 5, high))]
+        return [(crown, _turned(5, (high * 0.6, -0.2), (high * 0.75, high * 0.5), tip=high))]
     high = round(6.0 + 7.0 * draw, 1)
     if species == "spire":
         high = round(high * 1.25, 1)
-        cones = [_turned([(high * 0.2, high * 0.12)], 6 if near else 5, high * (0.7 if near else 1.0))]
-        if near:
-            cones.append(_turned([(high * 0.15, high * 0.42)], 6, high, 0.5))
-        trunk = [("#5a4534", _turned([(0.22, -1.0), (0.18, high * 0.2)], 3, None))] if near else []
-        return [*((crown, cone) for cone in cones), *trunk]
+        low, foot = (high * 0.2, high * 0.12), (0.22, -1.0)
+        if not near:
+            return [(crown, _turned(5, low, tip=high))]
+        cones = _turned(6, low, tip=high * 0.7), _turned(6, (high * 0.15, high * 0.42), tip=high, twist=0.5)
+        return [*((crown, cone) for cone in cones), ("#5a4534", _turned(3, foot, (0.18, high * 0.2)))]
     if species == "palm":
-        return [("#7d6a50", _turned([(0.22, -1.0), (0.15, high)], 3, None)), (crown, _fronds(high, 3.2))]
+        return [("#7d6a50", _turned(3, (0.22, -1.0), (0.15, high))), (crown, _fronds(high, 3.2))]
     r = high * (0.26 + 0.1 * draw)
-    stem = ("#5a4534", _turned([(0.26, -1.0), (0.2, high * 0.4)], 3, None))
+    stem = ("#5a4534", _turned(3, (0.26, -1.0), (0.2, high * 0.4)))
     if near:
-        profile = [(r * 0.55, high * 0.3), (r, high * 0.52), (r * 0.78, high * 0.8)]
-        return [stem, (crown, _turned(profile, 6, high))]
-    return [stem, (crown, _turned([(r * 0.6, high * 0.28), (r, high * 0.6)], 5, high))]
+        return [stem, (crown, _turned(6, (r * 0.55, high * 0.3), (r, high * 0.52), (r * 0.78, high * 0.8), tip=high))]
+    return [stem, (crown, _turned(5, (r * 0.6, high * 0.28), (r, high * 0.6), tip=high))]
 
 
 def _fronds(high: float, reach: float) -> Mesh:

@@ -4,44 +4,59 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 
 import shapely
 
 from aerialdojo_gen.scenes.worlds.draft import Draft
-from aerialdojo_gen.scenes.worlds.streets import Box, grid, side_of
-
-Point = tuple[float, float]
-SIDES = (0.0, 90.0, 180.0, 270.0)
+from aerialdojo_gen.scenes.worlds.shapes import SIDES, Box, Point
 
 
 def split(draft: Draft, box: Box, lane_m: Point, size_m: Point, *key: object) -> tuple[list[Box], list[Box]]:
     """Split ground into blocks, and the lanes between them; blocks are of `size_m`, the least and the most."""
-    wide = box.width >= box.depth
-    length, (least, most) = (box.width if wide else box.depth), size_m
+    length, (least, most) = max(box.width, box.depth), size_m
     lane = draft.number(*lane_m, "lane", *key)
     if length <= most or length < 2.0 * least + lane:
         return [box], []
     low = max(least, 0.34 * length)
     at = draft.number(low, max(low, length - lane - low), "cut", *key)
-    if wide:
-        parts = [Box(box.x0, box.y0, box.x0 + at, box.y1), Box(box.x0 + at + lane, box.y0, box.x1, box.y1)]
-        between = Box(box.x0 + at, box.y0, box.x0 + at + lane, box.y1)
+    if box.upright:
+        first, last = box._replace(y1=box.y0 + at), box._replace(y0=box.y0 + at + lane)
+        between = box._replace(y0=first.y1, y1=last.y0)
     else:
-        parts = [Box(box.x0, box.y0, box.x1, box.y0 + at), Box(box.x0, box.y0 + at + lane, box.x1, box.y1)]
-        between = Box(box.x0, box.y0 + at, box.x1, box.y0 + at + lane)
-    blocks, lanes = [], [between]
-    for k, part in enumerate(parts):
-        more, ways = split(draft, part, lane_m, size_m, *key, k)
-        blocks += more
-        lanes += ways
-    return blocks, lanes
+        first, last = box._replace(x1=box.x0 + at), box._replace(x0=box.x0 + at + lane)
+        between = box._replace(x0=first.x1, x1=last.x0)
+    blocks, lanes = split_all(draft, [first, last], lane_m, size_m, *key)
+    return blocks, [between, *lanes]
+
+
+def split_all(
+    draft: Draft, areas: Sequence[Box], lane_m: Point, size_m: Point, *key: object
+) -> tuple[list[Box], list[Box]]:  # fmt: skip
+    """Split several areas, as `split` does one."""
+    parts = [split(draft, area, lane_m, size_m, *key, k) for k, area in enumerate(areas)]
+    return [block for blocks, _ in parts for block in blocks], [lane for _, lanes in parts for lane in lanes]
+
+
+def fence_lines(box: Box, gate_x: float, half_m: float) -> list[list[list[float]]]:
+    """Lines round a box, as plans write them, with a gate in its south side, the first two beside it."""
+    x0, y0, x1, y1 = box
+    ends = [(gate_x + half_m, y0), (x1, y0), (x1, y1), (x0, y1), (x0, y0)]
+    runs = [((x0, y0), (gate_x - half_m, y0)), *pairwise(ends)]
+    return [[[round(x, 2), round(y, 2)] for x, y in run] for run in runs]
+
+
+def ring(outer: Box, inner: Box) -> list[Box]:
+    """Ground between a box and one in it, in four boxes; those in the south and the north reach from side to side."""
+    return [outer._replace(y1=inner.y0), outer._replace(y0=inner.y1),
+            Box(outer.x0, inner.y0, inner.x0, inner.y1), Box(inner.x1, inner.y0, outer.x1, inner.y1)]  # fmt: skip
 
 
 def inner_sides(draft: Draft, box: Box) -> list[float]:
     """Sides of a rectangle that do not lie at the site's edge."""
-    w, d = draft.width_m / 2 - 2.5, draft.depth_m / 2 - 2.5
-    clear = {0.0: box.x1 < w, 90.0: box.y1 < d, 180.0: box.x0 > -w, 270.0: box.y0 > -d}
-    return [yaw for yaw in SIDES if clear[yaw]]
+    inner = draft.site.grown(-2.5)
+    clear = (box.x1 < inner.x1, box.y1 < inner.y1, box.x0 > inner.x0, box.y0 > inner.y0)
+    return [yaw for yaw, is_clear in zip(SIDES, clear, strict=True) if is_clear]
 
 
 def town_house(draft: Draft, box: Box, name: str, storeys: int) -> None:
@@ -58,15 +73,14 @@ def town_house(draft: Draft, box: Box, name: str, storeys: int) -> None:
     draft.make("building", **arguments)
     draft.take(box.shape())
     if flat:
-        for x, y in grid(box.grown(-1.6), 4.2):
-            draft.slot("roof", x, y, draft.pick(SIDES, name, x, y), (3.4, 3.4), on=f"{name}_top")
+        draft.slots_over("roof", box.grown(-1.6), 4.2, (3.4, 3.4), name, on=f"{name}_top")
 
 
 def dressed(draft: Draft, box: Box, name: str, storeys: int, sides: Sequence[float], shops: float = 0.4) -> None:
     """Offer slots at a house's walls (``shop``, ``sign``, ``lane``); hang awnings, balconies and fire escapes."""
     awnings, escapes, balconies = [], [], []
     for yaw in sides:
-        (x, y), (u, v), length = side_of(box, yaw)
+        (x, y), (u, v), length = box.side(yaw)
         c, s = math.cos(math.radians(yaw)), math.sin(math.radians(yaw))
         n = int(length // 6.6)
         for k in range(n):
@@ -102,10 +116,9 @@ def strung(draft: Draft, lanes: Sequence[Box], houses: Sequence[Box], z_m: float
     walls = shapely.union_all([house.shape() for house in houses])
     ropes: dict[str, list[list[float]]] = {"washing_lines": [], "light_strings": []}
     for lane in lanes:
-        upright = lane.depth > lane.width
         for k in range(int(max(lane.width, lane.depth) // 9.0)):
             at = draft.number(3.0, 7.0, "across", lane.x0, lane.y0, k) + 9.0 * k
-            if upright:
+            if lane.upright:
                 ends = [lane.x0 - 0.02, lane.y0 + at, lane.x1 + 0.02, lane.y0 + at + 0.3]
             else:
                 ends = [lane.x0 + at, lane.y0 - 0.02, lane.x0 + at + 0.3, lane.y1 + 0.02]
@@ -122,7 +135,7 @@ def square(draft: Draft, box: Box) -> Point:
     """Pave a square, and offer slots on it, its middle left free; gives the middle."""
     draft.paint(box.rounded(), draft.material("square", box.x0, box.y0), rise_m=0.12)
     x, y = box.middle
-    for u, v in grid(box.grown(-1.4), 3.5):
+    for u, v in box.grown(-1.4).grid(3.5):
         if math.hypot(u - x, v - y) > 4.4:
             yaw = round(math.degrees(math.atan2(y - v, x - u)) / 90.0) * 90.0
             draft.slot("square", u, v, yaw, (3.3, 3.3))
@@ -131,26 +144,20 @@ def square(draft: Draft, box: Box) -> Point:
 
 def lane_streets(draft: Draft, lanes: Sequence[Box]) -> None:
     """Pave the lanes between blocks as streets; offer slots on them (``road``) and at their kerbs (``kerb``)."""
-    paths, w, d, lane_m, pavement_m = [], draft.width_m / 2, draft.depth_m / 2, 2.8, 1.6
+    paths, (w, d), lane_m, pavement_m = [], draft.half, 2.8, 1.6
     for lane in lanes:
         x, y = lane.middle
-        more = lane_m + pavement_m
-        if lane.depth > lane.width:
-            low, high = (lane.y0 - more, lane.y1 + more)
-            paths.append([[round(x, 2), round(max(low, -d), 2)], [round(x, 2), round(min(high, d), 2)]])
-        else:
-            low, high = (lane.x0 - more, lane.x1 + more)
-            paths.append([[round(max(low, -w), 2), round(y, 2)], [round(min(high, w), 2), round(y, 2)]])
+        x0, y0, x1, y1 = lane.grown(lane_m + pavement_m)
+        ends = ((x, max(y0, -d)), (x, min(y1, d))) if lane.upright else ((max(x0, -w), y), (min(x1, w), y))
+        paths.append([[round(u, 2), round(v, 2)] for u, v in ends])
     draft.make(
         "streets", paths=paths, lane_m=lane_m, pavement_m=pavement_m, surface=draft.material("street"),
         pavement=draft.material("pavement"),
     )  # fmt: skip
     for lane in lanes:
-        x, y = lane.middle
-        upright = lane.depth > lane.width
-        length, start = (lane.depth, lane.y0) if upright else (lane.width, lane.x0)
-        for k in range(int(length // 6.0)):
-            at = start + 3.0 + 6.0 * k
+        (x, y), upright = lane.middle, lane.upright
+        for k in range(int(max(lane.width, lane.depth) // 6.0)):
+            at = (lane.y0 if upright else lane.x0) + 3.0 + 6.0 * k
             for side in (-1, 1):
                 road, kerb = side * lane_m / 2, side * (lane_m + pavement_m - 0.85)
                 yaw = (90.0 if side > 0 else 270.0) if upright else (180.0 if side > 0 else 0.0)
@@ -183,11 +190,8 @@ def about_square(draft: Draft, w: float, d: float) -> Layout:
              Box(x0 - lane, y0, x0, d)]  # fmt: skip
     areas = [Box(-w, y1 + lane, x0 - lane, d), Box(x0, y1 + lane, w, d), Box(x1 + lane, -d, w, y1 + lane),
              Box(-w, -d, x1, y0 - lane), Box(-w, y0 - lane, x0 - lane, y1)]  # fmt: skip
-    lots: list[Box] = []
-    for k, area in enumerate(areas):
-        if min(area.width, area.depth) > 9.0:
-            more, _ = split(draft, area, (3.0, 4.5), (13.0, 30.0), k)
-            lots += more
+    parts = [(k, area) for k, area in enumerate(areas) if min(area.width, area.depth) > 9.0]
+    lots = [lot for k, area in parts for lot in split(draft, area, (3.0, 4.5), (13.0, 30.0), k)[0]]
     return lots, lanes, [Box(x0, y0, x1, y1)]
 
 
@@ -195,15 +199,11 @@ def avenue(draft: Draft, w: float, d: float) -> Layout:
     """A street from end to end, blocks in rows at both sides, a park at one end."""
     y, lane = draft.number(-0.25, 0.25, "y") * d, 8.8
     at = draft.number(0.4, 0.55, "park") * w
-    lanes = [Box(-w, y - lane / 2, w, y + lane / 2)]
-    lots: list[Box] = []
-    for k, (y0, y1) in enumerate(((-d, y - lane / 2), (y + lane / 2, d))):
-        row, ways = split(draft, Box(-w, y0, at if k == 0 else w, y1), (8.8, 8.8), (18.0, 34.0), k)
-        lots += row
-        lanes += ways
-    park = Box(at, -d, w, y - lane / 2)
+    street, park = Box(-w, y - lane / 2, w, y + lane / 2), Box(at, -d, w, y - lane / 2)
+    rows = [Box(-w, -d, at, street.y0), Box(-w, street.y1, w, d)]
+    lots, lanes = split_all(draft, rows, (8.8, 8.8), (18.0, 34.0))
     lots, more = left_open(draft, lots, 1)
-    return lots, lanes, [park, *more]
+    return lots, [street, *lanes], [park, *more]
 
 
 def estate(draft: Draft, w: float, d: float) -> Layout:
@@ -212,10 +212,9 @@ def estate(draft: Draft, w: float, d: float) -> Layout:
     lanes = [Box(-w, street - lane / 2, w, street + lane / 2)]
     y, lots, open_, k = street + lane / 2, [], [], 0
     while y + 13.0 < d:
-        lots.append(Box(-w + draft.number(2, 8, "in", k), y + 0.5, draft.number(-2, 6, "end", k), y + 13.0))
-        lots.append(
-            Box(lots[-1].x1 + draft.number(5, 9, "gap", k), y + 0.5, w - draft.number(2, 8, "out", k), y + 13.0)
-        )
+        end = draft.number(-2, 6, "end", k)
+        lots.append(Box(-w + draft.number(2, 8, "in", k), y + 0.5, end, y + 13.0))
+        lots.append(Box(end + draft.number(5, 9, "gap", k), y + 0.5, w - draft.number(2, 8, "out", k), y + 13.0))
         gap = draft.number(10, 14, "green", k)
         if y + 13.0 + gap < d:
             open_.append(Box(-w + 2.0, y + 13.5, w - 2.0, y + 13.0 + gap))

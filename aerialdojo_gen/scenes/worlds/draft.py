@@ -18,8 +18,9 @@ from aerialdojo_gen.base.rng import generator, pick, rank
 from aerialdojo_gen.scenes.catalogue import Catalogue
 from aerialdojo_gen.scenes.light import sun_at
 from aerialdojo_gen.scenes.plans.text import plan_text
-from aerialdojo_gen.scenes.worlds.kinds import Palette, SceneType, Slots
+from aerialdojo_gen.scenes.worlds.kinds import Palette, SceneType
 from aerialdojo_gen.scenes.worlds.paints import extents_m, repainted
+from aerialdojo_gen.scenes.worlds.shapes import SIDES, Box, Point, Pose
 from aerialdojo_gen.scenes.worlds.world import World
 
 STAGE = "vary"
@@ -54,12 +55,14 @@ class Draft:
         self.palette_name = self._one_of({name: p.held_out for name, p in kind.palettes.items()}, "palette")
         spans = kind.topologies[self.topology].size_m or kind.size_m
         self.width_m, self.depth_m = (self.whole(*span, "size", axis) for axis, span in zip("xy", spans, strict=True))
+        self.half = self.width_m / 2, self.depth_m / 2
+        self.site = Box(-self.half[0], -self.half[1], *self.half)
         self.head: Entry = self._light()
         self.lines: dict[str, Any] = {}
         self.areas: dict[str, Any] = {}
         self.floors: dict[str, float] = {}
         self.ground: Entry = {"material": self.material("ground")}
-        self._site: list[Entry] = []
+        self._entries: list[Entry] = []
         self._sections: dict[int, str] = {}
         self._title = ""
         self._slots: list[Slot] = []
@@ -100,11 +103,8 @@ class Draft:
         knob = self.kind.knobs[name]
         if name in self.world.knobs:
             return self.world.knobs[name]
-        return (
-            self.whole(knob.low, knob.high, "knob", name)
-            if knob.whole
-            else self.number(knob.low, knob.high, "knob", name)
-        )
+        draw = self.whole if knob.whole else self.number
+        return draw(knob.low, knob.high, "knob", name)
 
     def _unknown_knobs(self) -> None:
         for name, value in self.world.knobs.items():
@@ -151,8 +151,8 @@ class Draft:
 
     def material(self, role: str, *key: object) -> str:
         """Material of a role of the palette; of several one, drawn for the key."""
-        found = self.palette.materials[role]
-        return found if isinstance(found, str) else self.pick(found, "material", role, *key)
+        choices = self.palette.materials[role]
+        return choices if isinstance(choices, str) else self.pick(choices, "material", role, *key)
 
     # Entries
 
@@ -163,9 +163,9 @@ class Draft:
     def add(self, entry: Entry) -> None:
         """Add an entry of a plan."""
         if self._title:
-            self._sections[len(self._site)] = self._title
+            self._sections[len(self._entries)] = self._title
             self._title = ""
-        self._site.append(entry)
+        self._entries.append(entry)
 
     def paint(self, area: Any, material: str, **more: Any) -> None:
         """Paint an area."""
@@ -175,9 +175,14 @@ class Draft:
         """Call a builder of the kit."""
         self.add({"make": builder, **arguments})
 
-    def place(self, *things: Sequence[Any], **keys: Any) -> None:
-        """Place things where there is room; ``fit="must"`` for what the world cannot do without."""
-        self.add({"place": [list(thing) for thing in things], "fit": "skip", **keys})
+    def step(self, builder: str, **arguments: Any) -> None:
+        """Add a step to the ground."""
+        self.ground.setdefault("steps", []).append({"make": builder, **arguments})
+
+    def settle(self) -> None:
+        """Settle things on ground that is not level, and level it under them."""
+        self.head["placing"] = {"settle_m": 0.5, "margin_m": 0.4}
+        self.level_things = True
 
     # Ground that is taken
 
@@ -187,12 +192,17 @@ class Draft:
 
     def is_free(self, area: BaseGeometry) -> bool:
         """Whether an area lies on the site and on no ground that is taken."""
-        inside = shapely.box(-self.width_m / 2, -self.depth_m / 2, self.width_m / 2, self.depth_m / 2).contains(area)
-        return bool(inside) and not any(taken.intersects(area) for taken in self._taken)
+        return bool(self.site.shape().contains(area)) and not any(taken.intersects(area) for taken in self._taken)
 
-    def landmark(
-        self, spots: Iterable[tuple[float, float, float]], of: Iterable[str] | None = None
-    ) -> list[tuple[str, float, float]]:
+    def has_room(self, x: float, y: float, radius_m: float) -> bool:
+        """Whether a disc of ground is free."""
+        return self.is_free(shapely.Point(x, y).buffer(radius_m))
+
+    def take_disc(self, at: Point, radius_m: float) -> None:
+        """Take a disc of ground."""
+        self.take(shapely.Point(at).buffer(radius_m))
+
+    def landmark(self, spots: Iterable[Pose], of: Iterable[str] | None = None) -> list[tuple[str, float, float]]:
         """Place the type's landmarks, or some `of` them, at the first free of some poses, each another category."""
         placed: list[tuple[str, float, float]] = []
         low, high = self.kind.n_landmarks
@@ -203,11 +213,12 @@ class Draft:
         for x, y, yaw in spots:
             if not order or len(self.landmarks) >= wanted:
                 break
-            what = next((c for c in order if self.is_free(_box(x, y, *extents_m(self.catalogue, c), yaw, 0.5))), None)
-            if what is None:
+            grounds = ((c, _box(x, y, *extents_m(self.catalogue, c), yaw, 0.5)) for c in order)
+            what, ground = next((one for one in grounds if self.is_free(one[1])), ("", None))
+            if ground is None:
                 continue
             order.remove(what)
-            self.take(_box(x, y, *extents_m(self.catalogue, what), yaw, 0.5))
+            self.take(ground)
             self.landmarks.append(what)
             thing = repainted(self.catalogue, what, (x, y, yaw), self.rng("landmark", what, "variant"))
             margin = {} if what in self.kind.overhanging else {"margin_m": 0.4}
@@ -224,6 +235,16 @@ class Draft:
         """Offer a place for one thing; `kind` is one of the type's slots."""
         self._slots.append(Slot(kind, round(x, 2), round(y, 2), round(yaw_deg % 360.0, 1), room_m, on, settle_m))
 
+    def slots_over(
+        self, kind: str, box: Box, step_m: float, room_m: tuple[float, float], *key: object,
+        yaw_deg: float | None = None, on: float | str | None = None, free_m: float = 0.0,
+    ) -> None:  # fmt: skip
+        """Offer slots over a box, evenly, on a disc of free ground; they look along one of the four sides, drawn."""
+        for x, y in box.grid(step_m):
+            if not free_m or self.has_room(x, y, free_m):
+                yaw = self.pick(SIDES, *(key or (kind,)), x, y) if yaw_deg is None else yaw_deg
+                self.slot(kind, x, y, yaw, room_m, on=on)
+
     def fill_slots(self) -> None:
         """Deal the type's things to the slots, and write them: what has no room in the built scene is left out."""
         used: Counter[tuple[str, str]] = Counter()
@@ -233,9 +254,11 @@ class Draft:
             slots.sort(key=lambda s: rank(self.world.seed, STAGE, self._trial, kind, s.x, s.y, s.on))
             share = self.number(*self.kind.slots[kind].share, "share", kind) if slots else 0.0
             for slot in slots[: round(share * len(slots))]:
-                what = self._draw_category(self.kind.slots[kind], slot, used)
+                what = self._draw_category(slot, used)
                 if what is not None:
-                    rows.setdefault((kind, slot.on, slot.settle_m), []).append(self._thing(what, slot))
+                    rng = self.rng("thing", kind, slot.x, slot.y, slot.on)
+                    thing = repainted(self.catalogue, what, (slot.x, slot.y, slot.yaw_deg), rng)
+                    rows.setdefault((kind, slot.on, slot.settle_m), []).append(thing)
         unknown_kinds = {slot.kind for slot in self._slots} - set(self.kind.slots)
         assert not unknown_kinds, f"{self.world.type}: no slots {unknown_kinds} in its table"
         for (kind, on, settle_m), things in rows.items():
@@ -244,18 +267,26 @@ class Draft:
             keys: Entry = {"fit": "as_is"} if sure else {"fit": "skip", "margin_m": 0.25}
             keys |= {} if on is None else {"on": on}
             keys |= {} if settle_m is None else {"settle_m": settle_m}
-            self.add({"place": sorted(things, key=_pose), **keys, **self._levelled(on)})
+            things.sort(key=lambda thing: (thing[1], thing[2]) if isinstance(thing, list) else tuple(thing["at"]))
+            self.add({"place": things, **keys, **self._levelled(on)})
         self._slots.clear()
 
     def _levelled(self, on: float | str | None) -> Entry:
         return {"level": True} if self.level_things and on is None else {}
 
-    def _draw_category(self, slots: Slots, slot: Slot, used: Counter[tuple[str, str]]) -> str | None:
+    def available(self, kind: str, used: Counter[tuple[str, str]]) -> dict[str, float]:
+        """Weights of what may still stand at slots of a kind: not too often, and not what is held out."""
+        slots, held_out = self.kind.slots[kind], self.world.held_out
+        return {
+            what: weight for what, weight in slots.of.items()
+            if used[kind, what] < slots.most and (held_out or what not in slots.held_out)
+        }  # fmt: skip
+
+    def _draw_category(self, slot: Slot, used: Counter[tuple[str, str]]) -> str | None:
         """Draw what stands at a slot; None where nothing that is left has room."""
         weights = {
-            what: weight for what, weight in slots.of.items()
-            if used[slot.kind, what] < slots.most and (what not in slots.held_out or self.world.held_out)
-            and all(e <= r for e, r in zip(extents_m(self.catalogue, what), slot.room_m, strict=True))
+            what: weight for what, weight in self.available(slot.kind, used).items()
+            if all(e <= r for e, r in zip(extents_m(self.catalogue, what), slot.room_m, strict=True))
         }  # fmt: skip
         if not weights:
             return None
@@ -263,11 +294,6 @@ class Draft:
         what = list(weights)[int(rng.choice(len(weights), p=np.array([*weights.values()]) / sum(weights.values())))]
         used[slot.kind, what] += 1
         return what
-
-    def _thing(self, what: str, slot: Slot) -> Any:
-        """Give a thing its variant, and where it can have one a colour of its own."""
-        rng = self.rng("thing", slot.kind, slot.x, slot.y, slot.on)
-        return repainted(self.catalogue, what, (slot.x, slot.y, slot.yaw_deg), rng)
 
     def add_life(self) -> None:
         """Set out the type's people and animals, where all else leaves room."""
@@ -297,17 +323,13 @@ class Draft:
             "size_m": [self.width_m, self.depth_m], "ceiling_m": self.whole(low, high, "ceiling"), **turn,
             **self.head, **({"designs": "held_out"} if self.world.held_out else {}),
             "world": world, "floor_m": self.floors, "lines": self.lines, "areas": self.areas,
-            "ground": self.ground, "site": self._site,
+            "ground": self.ground, "site": self._entries,
         }  # fmt: skip
 
     def text(self) -> str:
         """Return the plan as TOML."""
         name, about = self.world.name, self.kind.topologies[self.topology].about
         return plan_text(self.tables(), f"{name}: {about}", self._sections)
-
-
-def _pose(thing: Any) -> tuple[float, float]:
-    return (thing[1], thing[2]) if isinstance(thing, list) else tuple(thing["at"])
 
 
 def _box(x: float, y: float, along: float, across: float, yaw_deg: float, margin_m: float) -> BaseGeometry:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 
 import tomli
@@ -14,7 +16,6 @@ from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.scenes.plans.build import build_tables
 from aerialdojo_gen.scenes.worlds.draft import Draft, NoRoomError
 from aerialdojo_gen.scenes.worlds.kinds import load_type
-from aerialdojo_gen.scenes.worlds.types import generator_of
 from aerialdojo_gen.scenes.worlds.world import World, version_of
 
 MAX_DRAWS = 12
@@ -30,6 +31,12 @@ class MadeWorld:
     scene: Scene
     topology: str
     refused: tuple[tuple[str, str], ...]  # Reason and what it was about, one a refused draw
+
+
+def generator_of(name: str) -> Callable[[Draft], None]:
+    """Look up the generator of a type, ``U_ParkingLot``: `write` of the module ``u_parkinglot``."""
+    write: Callable[[Draft], None] = import_module(f"aerialdojo_gen.scenes.worlds.types.{name.lower()}").write
+    return write
 
 
 def make_world(world: World, scene_assets: Path, catalogue: Catalogue) -> MadeWorld:

@@ -10,36 +10,15 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.scenes.worlds.draft import Draft, NoRoomError
-from aerialdojo_gen.scenes.worlds.wilds import (
-    about,
-    anywhere,
-    beside,
-    clearing,
-    paths,
-    smoothed,
-    step,
-    strewn,
-    winding,
-)
-
-Point = tuple[float, float]
-
-
-def ahead(at: Point, yaw_deg: float, by_m: float, left_m: float = 0.0) -> Point:
-    """Point ahead of a pose by a distance, and to its left by another."""
-    return beside((*at, yaw_deg), by_m, left_m)
-
-
-def towards(at: Point, to: Point) -> float:
-    """Direction from a point to another, degrees."""
-    return math.degrees(math.atan2(to[1] - at[1], to[0] - at[0]))
+from aerialdojo_gen.scenes.worlds.shapes import Point, Pose, ahead, point, smoothed, towards
+from aerialdojo_gen.scenes.worlds.wilds import about, anywhere, clearing, strewn, tread, winding
 
 
 def coast(
     draft: Draft, name: str, at: Point, radii_m: Point, bays: Sequence[tuple[float, float, float]] = ()
 ) -> shapely.Polygon:
     """Name an island's coastline: a wavy ellipse with bays (direction, share of the radius, half width)."""
-    rng, points = draft.rng("coast", name), []
+    rng, (w, d), points = draft.rng("coast", name), draft.half, []
     waves = [(k, float(rng.uniform(0.02, 0.16 / k)), float(rng.uniform(0, 360))) for k in (2, 3, 5)]
     for k in range(36):
         deg = 10.0 * k
@@ -49,8 +28,7 @@ def coast(
             share *= 1.0 - depth * max(0.0, 1.0 - (off / half) * (off / half))
         angle = math.radians(deg)
         x, y = at[0] + radii_m[0] * share * math.cos(angle), at[1] + radii_m[1] * share * math.sin(angle)
-        points.append((round(min(max(x, 4 - draft.width_m / 2), draft.width_m / 2 - 4), 1),
-                       round(min(max(y, 4 - draft.depth_m / 2), draft.depth_m / 2 - 4), 1)))  # fmt: skip
+        points.append(point(min(max(x, 4 - w), w - 4), min(max(y, 4 - d), d - 4)))
     draft.lines[name] = {"points": [list(p) for p in points], "smooth": 1}
     return shapely.Polygon(smoothed(points, 1).coords).buffer(0)
 
@@ -65,13 +43,11 @@ def islands(
     draft.areas["land"] = uneven[0] if len(parts) == 1 else {"union": uneven}
     draft.floors["sea"] = 0.0
     shore = f"0.5*eased(inland, 0, 3.5) + 0.09*clip(inland, 0, 14) + {relief_m}*eased(inland, 6, 20)*(1 + 0.8*noise)"
-    step(
-        draft, "ground_by_formula", cell_m=2.0, noise_m=draft.number(16, 30, "noise"),
+    draft.step("ground_by_formula", cell_m=2.0, noise_m=draft.number(16, 30, "noise"),
         inland={"inland": "land", **(inland or {})}, let={"shore": shore, **heights},
         height=f"choose(inland, max(shore + {total}, 0.25*eased(inland, 0, 1)), 0)",
     )  # fmt: skip
-    draft.head["placing"] = {"settle_m": 0.5, "margin_m": 0.4}
-    draft.level_things = True
+    draft.settle()
     draft.section("The land and the sea")
     box = [round(v, 1) for v in land.bounds]
     draft.make("paint_heath", layers=[
@@ -101,12 +77,16 @@ def is_open(draft: Draft, land: BaseGeometry, area: BaseGeometry, margin_m: floa
     return draft.is_free(area) and land.distance(area) > margin_m
 
 
+def _strip(at: Point, yaw_deg: float, first_m: float, last_m: float, half_m: float) -> BaseGeometry:
+    ends = [ahead(at, yaw_deg, first_m), ahead(at, yaw_deg, last_m)]
+    return shapely.LineString(ends).buffer(half_m, cap_style="flat")
+
+
 def jetty(draft: Draft, land: BaseGeometry, at: Point, yaw_deg: float, length_m: float) -> bool:
     """Build a jetty out from a point of the shore, where the water is free; offer slots on it, and berths."""
     draft.floors.setdefault("jetty", 1.4)
     width, foot = 2.6, ahead(at, yaw_deg, -2.2)
-    body = shapely.LineString([ahead(at, yaw_deg, 2.5), ahead(at, yaw_deg, length_m + 7)])
-    if not is_open(draft, land, body.buffer(5.5, cap_style="flat"), 0.3):
+    if not is_open(draft, land, _strip(at, yaw_deg, 2.5, length_m + 7, 5.5), 0.3):
         return False
     draft.make(
         "pier", at=list(foot), yaw_deg=round(yaw_deg, 1), length_m=length_m + 2.2, width_m=width, z="jetty",
@@ -115,23 +95,21 @@ def jetty(draft: Draft, land: BaseGeometry, at: Point, yaw_deg: float, length_m:
     # The berths have ground of their own, which nothing that drifts may take.
     for side in (1.0, -1.0):
         for k in range(max(1, int((length_m - 4.0) // 11.5))):
-            x, y = ahead(at, yaw_deg, 9.0 + 11.5 * k, side * (width / 2 + 2.5))
-            draft.slot("berth", x, y, yaw_deg + (180.0 if side > 0 else 0.0), (10.6, 4.2), on="sea")
-    x, y = ahead(at, yaw_deg, length_m + 4.2)
-    draft.slot("berth", x, y, yaw_deg + 90.0, (14.2, 5.4), on="sea")
+            berth = ahead(at, yaw_deg, 9.0 + 11.5 * k, side * (width / 2 + 2.5))
+            draft.slot("berth", *berth, yaw_deg + (180.0 if side > 0 else 0.0), (10.6, 4.2), on="sea")
+    draft.slot("berth", *ahead(at, yaw_deg, length_m + 4.2), yaw_deg + 90.0, (14.2, 5.4), on="sea")
     for k in range(int(length_m // 4.6)):
-        side = -0.75 if k % 2 else 0.75
-        x, y = ahead(at, yaw_deg, 3.4 + 4.6 * k, side)
-        draft.slot("jetty", x, y, yaw_deg + (90.0 if side < 0 else -90.0), (2.0, 2.9), on="jetty")
-    draft.take(shapely.LineString([foot, ahead(at, yaw_deg, length_m + 7)]).buffer(6.5, cap_style="flat"))
+        side = -1 if k % 2 else 1
+        spot = ahead(at, yaw_deg, 3.4 + 4.6 * k, side * 0.75)
+        draft.slot("jetty", *spot, yaw_deg - side * 90.0, (2.0, 2.9), on="jetty")
+    draft.take(_strip(at, yaw_deg, -2.2, length_m + 7, 6.5))
     return True
 
 
 def huts_over_water(draft: Draft, land: BaseGeometry, at: Point, yaw_deg: float, rows: int) -> bool:
     """Lead a boardwalk out from the shore, with huts on stilts at both sides of it."""
     length = 6.0 + 9.0 * rows
-    body = shapely.LineString([ahead(at, yaw_deg, 4.0), ahead(at, yaw_deg, length + 2)])
-    if not is_open(draft, land, body.buffer(9.5, cap_style="flat"), 0.2):
+    if not is_open(draft, land, _strip(at, yaw_deg, 4.0, length + 2, 9.5), 0.2):
         return False
     draft.floors["boardwalk"] = 1.72
     middles = [7.5 + 9.0 * k for k in range(rows)]
@@ -147,10 +125,10 @@ def huts_over_water(draft: Draft, land: BaseGeometry, at: Point, yaw_deg: float,
         porch_m=2.1, steps=False,
     )  # fmt: skip
     for k in range(rows):
-        x, y = ahead(at, yaw_deg, 3.4 + 9.0 * k, -0.9 if k % 2 else 0.9)
-        draft.slot("jetty", x, y, yaw_deg + 90.0 * (1 if k % 2 else -1), (2.0, 2.0), on="boardwalk")
-    x, y = ahead(at, yaw_deg, length - 1.2)
-    draft.slot("jetty", x, y, yaw_deg, (2.0, 2.4), on="boardwalk")
+        side = -1 if k % 2 else 1
+        spot = ahead(at, yaw_deg, 3.4 + 9.0 * k, side * 0.9)
+        draft.slot("jetty", *spot, yaw_deg - side * 90.0, (2.0, 2.0), on="boardwalk")
+    draft.slot("jetty", *ahead(at, yaw_deg, length - 1.2), yaw_deg, (2.0, 2.4), on="boardwalk")
     draft.take(shapely.LineString([at, ahead(at, yaw_deg, length + 3)]).buffer(10.5, cap_style="flat"))
     return True
 
@@ -200,7 +178,6 @@ class Isle(NamedTuple):
 
 def build_village(draft: Draft, isle: Isle) -> None:
     """Found a village with landings, lookouts, paths between them, beaches, boats and woods."""
-    w, d = draft.width_m / 2, draft.depth_m / 2
     draft.take(isle.shut)
     clearing(draft, "square", isle.village, 8.0)
     for k, head in enumerate(isle.heads):
@@ -211,12 +188,11 @@ def build_village(draft: Draft, isle: Isle) -> None:
     draft.section("The village")
     _houses(draft, isle)
     about(draft, "village", isle.village, (3.2, 6.6), 9, (4.9, 3.8))
-    draft.take(shapely.Point(isle.village).buffer(9.0))
+    draft.take_disc(isle.village, 9.0)
     afloat(draft, isle.land, 9)
     beach_slots(draft, isle.land, off=isle.cliffs)
-    sea = shapely.box(-w, -d, w, d).difference(isle.land.buffer(-3.5))
-    draft.take(sea)
-    step(draft, "level_under_things")
+    draft.take(draft.site.shape().difference(isle.land.buffer(-3.5)))
+    draft.step("level_under_things")
     draft.section("Landmarks")
     spots = [(*head, float(round(towards(head, isle.village)))) for head in isle.heads]
     inner = isle.land.buffer(-7.0)
@@ -247,9 +223,8 @@ def _landings(draft: Draft, isle: Isle) -> None:
 
 def _ways(draft: Draft, isle: Isle) -> None:
     """Paths from the village to the lookouts and to the shore, so far as they lie on land."""
-    lines = {}
     shore = landing(isle.land, isle.village, isle.bay_deg)
-    lines["to_shore"] = winding(draft, "to_shore", (ahead(isle.village, isle.bay_deg, 6.5), shore), 0.4, 1)
+    lines = {"to_shore": winding(draft, "to_shore", (ahead(isle.village, isle.bay_deg, 6.5), shore), 0.4, 1)}
     for k, head in enumerate(isle.heads):
         yaw = towards(isle.village, head)
         ends = (ahead(isle.village, yaw, 6.5), ahead(head, yaw, -6.6))
@@ -258,36 +233,32 @@ def _ways(draft: Draft, isle: Isle) -> None:
             lines[f"way_{k}"] = line
         else:
             del draft.lines[f"way_{k}"]
-    paths(draft, lines)
+    tread(draft, lines)
 
 
 def _houses(draft: Draft, isle: Isle) -> None:
     """Houses about the square, fronts to it, each on a level pad with a yard."""
     inner = isle.land.buffer(-6.5)
-    found: list[tuple[float, float, float]] = []
-    wanted = round(draft.knob("houses"))
-    rng = draft.rng("houses")
+    poses: list[Pose] = []
+    wanted, rng = round(draft.knob("houses")), draft.rng("houses")
     for _ in range(160):
         angle, away = float(rng.uniform(0, 360)), float(rng.uniform(13.5, 27.0))
-        x, y = ahead(isle.village, angle, away)
-        spot = shapely.Point(x, y)
-        if len(found) < wanted and inner.contains(spot) and draft.is_free(spot.buffer(5.2)):
-            turn = round(angle + 180.0 + float(rng.uniform(-25, 25)), 1) % 360.0
-            found.append((x, y, turn))
-            draft.take(spot.buffer(5.6))
-    if len(found) < 2:
+        spot = ahead(isle.village, angle, away)
+        if len(poses) < wanted and inner.contains(shapely.Point(spot)) and draft.has_room(*spot, 5.2):
+            poses.append((*spot, round(angle + 180.0 + float(rng.uniform(-25, 25)), 1) % 360.0))
+            draft.take_disc(spot, 5.6)
+    if len(poses) < 2:
         raise NoRoomError("no room for the village")
-    for x, y, yaw in found:
-        step(draft, "level_area", area=[{"disc": [x, y, 4.2]}], blend_m=3.5)
+    for x, y, yaw in poses:
+        draft.step("level_area", area=[{"disc": [x, y, 4.2]}], blend_m=3.5)
         draft.paint({"blob": [x, y, 6.0, draft.whole(0, 999, "yard", x), 0.2]}, draft.material("glade", x))
         for side in (-1, 1):
             draft.slot("yard", *ahead((x, y), yaw, draft.number(1, 4, "yard", x, side), side * 6.2), yaw, (3.0, 3.0))
-    poses = [list(p) for p in found]
     if draft.material("homes") == "huts":
-        draft.make("stilt_huts", at=poses, walls=walls(draft, len(poses), "home"))
+        draft.make("stilt_huts", at=[list(p) for p in poses], walls=walls(draft, len(poses), "home"))
         return
     draft.make(
-        "house_row", at=[p[:2] for p in poses], yaws_deg=[p[2] for p in poses], walls=walls(draft, 6, "home"),
+        "house_row", at=[list(p[:2]) for p in poses], yaws_deg=[p[2] for p in poses], walls=walls(draft, 6, "home"),
         style={"width_m": draft.number(6.0, 6.9, "house_w"), "depth_m": 5.6, "storeys": 1, "storey_m": 2.7,
                "roof_m": draft.number(2.0, 2.8, "house_roof")},
         roofs=[draft.material("roof", k) for k in range(2)], doors=["#2f5f6e", "#6e2f2a", "#e9dcb0"],
@@ -306,9 +277,9 @@ def _growth(draft: Draft) -> None:
     trees, low = draft.material("trees").split("+"), draft.material("low").split("+")
     most = round(draft.knob("trees") / len(trees) / 2)
     kinds = [
-        {"of": tree, "spacing_m": 3.8, "limit": most, "scale": draft.number(low_, high, "scale", tree, low_)}
+        {"of": tree, "spacing_m": 3.8, "limit": most, "scale": draft.number(least, high, "scale", tree, least)}
         for tree in trees
-        for low_, high in ((0.9, 1.1), (1.2, 1.5))
+        for least, high in ((0.9, 1.1), (1.2, 1.5))
     ]
     kinds += [{"of": one, "spacing_m": 2.6, "limit": 15, "scale": draft.number(1, 1.5, "low", one)} for one in low]
     draft.make("undergrowth", area="inner", kinds=kinds)

@@ -3,62 +3,62 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
-import numpy as np
 import shapely
 
-from aerialdojo_gen.scenes.worlds.draft import Draft
+from aerialdojo_gen.scenes.worlds.draft import Draft, NoRoomError
 from aerialdojo_gen.scenes.worlds.paints import extents_m
-from aerialdojo_gen.scenes.worlds.street_maps import pose_on
-
-Point = tuple[float, float]
+from aerialdojo_gen.scenes.worlds.shapes import Point, Pose, ahead, heading, point, pose_on, smoothed, towards
 
 
 def rolling(draft: Draft, height_m: float, wavelength_m: tuple[float, float] = (28, 48), cell_m: float = 1.7) -> None:
     """Let the ground roll, and level it under what stands on it."""
-    step = {
-        "make": "rolling_ground", "cell_m": cell_m, "height_m": height_m, "octaves": 3,
-        "wavelength_m": draft.number(*wavelength_m, "waves"), "seed": draft.whole(0, 10_000, "relief"),
-    }  # fmt: skip
-    draft.ground.setdefault("steps", []).append(step)
-    draft.head["placing"] = {"settle_m": 0.5, "margin_m": 0.4}
-    draft.level_things = True
+    draft.step(
+        "rolling_ground", cell_m=cell_m, height_m=height_m, octaves=3,
+        wavelength_m=draft.number(*wavelength_m, "waves"), seed=draft.whole(0, 10_000, "relief"),
+    )  # fmt: skip
+    draft.settle()
 
 
-def step(draft: Draft, builder: str, **arguments: Any) -> None:
-    """Add a step to the ground."""
-    draft.ground.setdefault("steps", []).append({"make": builder, **arguments})
+def patches(
+    draft: Draft, role: str, kinds: int, count: int, radius_m: list[float], most: int = 9999, key: str = "patches"
+) -> None:  # fmt: skip
+    """Paint patches of several materials of a role on the ground, by a seed of at `most`."""
+    names = [draft.material(role, k) for k in range(kinds)]
+    draft.make("paint_patches", materials=names, count=count, radius_m=radius_m, seed=draft.whole(0, most, key))
+
+
+def open_country(draft: Draft, spots: Sequence[Point], kind: str, number: int, room_m: Point) -> None:
+    """Place landmarks, beside some points first, and things anywhere, on ground that is level under each."""
+    draft.step("level_under_things")
+    landmarks(draft, spots)
+    strewn(draft, kind, number, room_m)
+    draft.fill_slots()
 
 
 def winding(draft: Draft, name: str, ends: tuple[Point, Point], swing_m: float, bends: int = 4) -> shapely.LineString:
     """Name a winding line of the plan between two points; gives about where it goes."""
     (x0, y0), (x1, y1) = ends
-    length = math.hypot(x1 - x0, y1 - y0)
+    length = math.dist(*ends)
     nx, ny = -(y1 - y0) / length, (x1 - x0) / length
     rng = draft.rng("line", name)
-    points = [ends[0]]
-    for k in range(1, bends + 1):
-        f, off = k / (bends + 1), float(rng.uniform(-swing_m, swing_m))
-        points.append((x0 + f * (x1 - x0) + nx * off, y0 + f * (y1 - y0) + ny * off))
-    points.append(ends[1])
-    draft.lines[name] = {"points": [[round(x, 1), round(y, 1)] for x, y in points], "smooth": 3}
+    offsets = [(k / (bends + 1), float(rng.uniform(-swing_m, swing_m))) for k in range(1, bends + 1)]
+    bent = [(x0 + f * (x1 - x0) + nx * off, y0 + f * (y1 - y0) + ny * off) for f, off in offsets]
+    points = [ends[0], *bent, ends[1]]
+    draft.lines[name] = {"points": [list(point(x, y)) for x, y in points], "smooth": 3}
     return smoothed(points, 3)
 
 
-def smoothed(points: Sequence[Point], times: int) -> shapely.LineString:
-    """Cut corners so often, as plans do."""
-    line = np.array(points)
-    for _ in range(times):
-        first, last = line[:-1] * 0.75 + line[1:] * 0.25, line[:-1] * 0.25 + line[1:] * 0.75
-        line = np.concatenate([line[:1], np.stack([first, last], 1).reshape(-1, 2), line[-1:]])
-    return shapely.LineString(line)
+def paths(draft: Draft, ends: Mapping[str, tuple[Point, Point]], swing_m: float, bends: int) -> None:
+    """Tread winding paths between points, by the names of their lines."""
+    tread(draft, {name: winding(draft, name, both, swing_m, bends) for name, both in ends.items()})
 
 
-def paths(draft: Draft, lines: dict[str, shapely.LineString]) -> None:
+def tread(draft: Draft, lines: Mapping[str, shapely.LineString]) -> None:
     """Tread paths along named lines: level, painted, kept free, with slots (``wayside``) beside them."""
-    step(draft, "level_along", lines=list(lines), width_m=1.2, blend_m=3, smooth_m=10)
+    draft.step("level_along", lines=list(lines), width_m=1.2, blend_m=3, smooth_m=10)
     ribbons = [{"ribbon": name, "width_m": 1.5, "round_ends": True} for name in lines]
     draft.section("Paths")
     draft.paint(ribbons, draft.material("path"))
@@ -67,20 +67,17 @@ def paths(draft: Draft, lines: dict[str, shapely.LineString]) -> None:
         draft.take(line.buffer(1.05))
     for name, line in lines.items():
         for k in range(int(line.length // 8.0)):
-            at = 4.0 + 8.0 * k
-            here, there = line.interpolate(at), line.interpolate(at + 0.5)
-            yaw = math.atan2(there.y - here.y, there.x - here.x)
-            side = 1 if draft.chance(0.5, "side", name, k) else -1
-            x, y = here.x - math.sin(yaw) * side * 2.3, here.y + math.cos(yaw) * side * 2.3
-            if draft.is_free(shapely.Point(x, y).buffer(1.0)):
-                draft.slot("wayside", x, y, math.degrees(yaw) - side * 90.0, (2.4, 2.6))
+            x, y, yaw = heading(line, 4.0 + 8.0 * k)
+            side, turn = (1 if draft.chance(0.5, "side", name, k) else -1), math.radians(yaw)
+            x, y = x - math.sin(turn) * side * 2.3, y + math.cos(turn) * side * 2.3
+            if draft.has_room(x, y, 1.0):
+                draft.slot("wayside", x, y, yaw - side * 90.0, (2.4, 2.6))
 
 
 def clearing(draft: Draft, name: str, at: Point, radius_m: float) -> None:
     """Clear and level a round place, and take its ground."""
-    x, y = at
-    step(draft, "level_area", area={"disc": [x, y, round(radius_m * 0.9, 1)]}, blend_m=5)
-    draft.areas[name] = {"blob": [x, y, radius_m, draft.whole(0, 1999, "blob", name), 0.25]}
+    draft.step("level_area", area={"disc": [*at, round(radius_m * 0.9, 1)]}, blend_m=5)
+    draft.areas[name] = {"blob": [*at, radius_m, draft.whole(0, 1999, "blob", name), 0.25]}
     draft.paint({"area": name, "grow_m": 1.2}, draft.material("patch", name))
     draft.paint(name, draft.material("glade", name))
 
@@ -88,8 +85,8 @@ def clearing(draft: Draft, name: str, at: Point, radius_m: float) -> None:
 def brook(draft: Draft, name: str, ends: tuple[Point, Point], swing_m: float) -> shapely.LineString:
     """Cut the bed of a brook, and let water flow in it; gives its middle line."""
     bed = winding(draft, name, ends, swing_m)
-    step(draft, "level_along", lines=[name], width_m=5.6, blend_m=5, smooth_m=40)
-    step(draft, "sink_area", area={"ribbon": name, "width_m": 7.0}, depth_m=1.8, blend_m=2.4)
+    draft.step("level_along", lines=[name], width_m=5.6, blend_m=5, smooth_m=40)
+    draft.step("sink_area", area={"ribbon": name, "width_m": 7.0}, depth_m=1.8, blend_m=2.4)
     draft.areas["water"] = {"ribbon": name, "width_m": 2.8}
     water(draft)
     return bed
@@ -104,28 +101,22 @@ def water(draft: Draft) -> None:
 
 def bridged(draft: Draft, bed: shapely.LineString, share: float) -> list[Point]:
     """Lay a footbridge over a brook at a share of its length, and take its ground; gives the landings."""
-    middle = bed.interpolate(bed.length * share)
-    ahead = bed.interpolate(bed.project(middle) + 0.5)
-    across = math.degrees(math.atan2(ahead.y - middle.y, ahead.x - middle.x)) + 90.0
-    c, s = math.cos(math.radians(across)), math.sin(math.radians(across))
+    x, y, along = heading(bed, bed.length * share)
+    across = math.radians(along + 90.0)
     draft.take(bed.buffer(3.8))
-    draft.take(middle.buffer(7.5))
-    at = [round(middle.x, 1), round(middle.y, 1)]
-    draft.make("footbridge", at=at, yaw_deg=round(across, 1), span_m=8.5, place="")
-    return [(round(middle.x + u * c, 1), round(middle.y + u * s, 1)) for u in (-6.5, 6.5)]
+    draft.take_disc((x, y), 7.5)
+    draft.make("footbridge", at=list(point(x, y)), yaw_deg=round(along + 90.0, 1), span_m=8.5, place="")
+    return [point(x + u * math.cos(across), y + u * math.sin(across)) for u in (-6.5, 6.5)]
 
 
-def about(
-    draft: Draft, kind: str, at: Point, ring: tuple[float, float], number: int, room_m: tuple[float, float]
-) -> None:
+def about(draft: Draft, kind: str, at: Point, ring: Point, number: int, room_m: Point) -> None:
     """Offer slots about a point, in a ring between two radii, fronts to the point."""
     rng = draft.rng("about", kind, *at)
     first = float(rng.uniform(0, 360))
     for k in range(number):
-        angle = math.radians(first + (k + float(rng.uniform(-0.25, 0.25))) * 360 / number)
-        away = float(rng.uniform(*ring))
-        x, y = at[0] + away * math.cos(angle), at[1] + away * math.sin(angle)
-        draft.slot(kind, x, y, math.degrees(angle) + 180.0 + float(rng.uniform(-20, 20)), room_m)
+        turn = first + (k + float(rng.uniform(-0.25, 0.25))) * 360 / number
+        spot = ahead(at, turn, float(rng.uniform(*ring)))
+        draft.slot(kind, *spot, turn + 180.0 + float(rng.uniform(-20, 20)), room_m)
 
 
 def strewn(draft: Draft, kind: str, number: int, room_m: tuple[float, float], margin_m: float = 4.0) -> None:
@@ -142,29 +133,16 @@ def strewn(draft: Draft, kind: str, number: int, room_m: tuple[float, float], ma
 def anywhere(draft: Draft, number: int = 60, margin_m: float = 7.0) -> list[tuple[float, float, float]]:
     """Draw poses for landmarks over the site."""
     rng, w, d = draft.rng("anywhere"), draft.width_m / 2 - margin_m, draft.depth_m / 2 - margin_m
-    return [
-        (round(float(rng.uniform(-w, w)), 1), round(float(rng.uniform(-d, d)), 1), round(float(rng.uniform(0, 360))))
-        for _ in range(number)
-    ]
+    return [(*point(rng.uniform(-w, w), rng.uniform(-d, d)), round(rng.uniform(0, 360))) for _ in range(number)]
 
 
 def wood(draft: Draft, area: Any, most: float, spacing_m: float = 4.6) -> None:
     """Plant the palette's trees on what is left of an area, and what grows under them."""
     species = draft.material("trees").split("+")
-    draft.add({
-        "pattern": {"of": species, "scatter": area, "spacing_m": spacing_m, "limit": int(most), "stream": "wood"},
-        "fit": "skip", "room_m": 0.0,
-    })  # fmt: skip
+    pattern = {"of": species, "scatter": area, "spacing_m": spacing_m, "limit": int(most), "stream": "wood"}
+    draft.add({"pattern": pattern, "fit": "skip", "room_m": 0.0})
     low = draft.shuffled(["bush", "fern", "sapling", "grass_tuft", "wildflowers", "young_spruce"], "undergrowth")
     draft.make("undergrowth", area=area, kinds=[{"of": kind, "spacing_m": 3.5, "limit": 24} for kind in low[:3]])
-
-
-Pose = tuple[float, float, float]
-
-
-def point(x: float, y: float) -> Point:
-    """Round a point to decimetres, as plans write it."""
-    return round(x, 1), round(y, 1)
 
 
 class Rock(NamedTuple):
@@ -179,23 +157,20 @@ class Rock(NamedTuple):
     def shape(self, grow_m: float = 0.0) -> shapely.Polygon:
         """Return about its outline."""
         u, v = self.radius_m * math.sqrt(self.long) + grow_m, self.radius_m / math.sqrt(self.long) + grow_m
-        round_ = shapely.affinity.scale(shapely.Point(0, 0).buffer(1.0), u, v, origin=(0, 0))
-        return shapely.affinity.translate(shapely.affinity.rotate(round_, self.yaw_deg, origin=(0, 0)), *self.at)
+        ellipse = shapely.affinity.scale(shapely.Point(0, 0).buffer(1.0), u, v, origin=(0, 0))
+        return shapely.affinity.translate(shapely.affinity.rotate(ellipse, self.yaw_deg, origin=(0, 0)), *self.at)
 
 
 def spot_for(draft: Draft, radius_m: float, *key: object, spots: Iterable[Point] = ()) -> Point | None:
     """Find a free round spot: the first of some, else anywhere."""
     rng, w, d = draft.rng("spot", *key), draft.width_m / 2 - radius_m - 1.5, draft.depth_m / 2 - radius_m - 1.5
-    drawn = ((round(float(rng.uniform(-w, w)), 1), round(float(rng.uniform(-d, d)), 1)) for _ in range(240))
-    for spot in (*spots, *drawn):
-        if draft.is_free(shapely.Point(spot).buffer(radius_m)):
-            return spot
-    return None
+    drawn = (point(rng.uniform(-w, w), rng.uniform(-d, d)) for _ in range(240))
+    return next((spot for spot in (*spots, *drawn) if draft.has_room(*spot, radius_m)), None)
 
 
 def lay_out(draft: Draft, spots: Sequence[Point] = ()) -> list[Point]:
     """Lay out the topology's places at the first free of some spots, else where there is room."""
-    found = []
+    middles = []
     for k, name in enumerate(draft.kind.topologies[draft.topology].places):
         place = draft.kind.places[name]
         at = spot_for(draft, place.radius_m + 0.8, "place", k, spots=spots)
@@ -204,112 +179,103 @@ def lay_out(draft: Draft, spots: Sequence[Point] = ()) -> list[Point]:
         clearing(draft, f"{name}_{k}", at, place.radius_m)
         for ring in place.rings:
             about(draft, ring.slots, at, ring.away_m, ring.number, ring.room_m)
-        draft.take(shapely.Point(at).buffer(place.radius_m + 0.5))
-        found.append(at)
-    return found
+        draft.take_disc(at, place.radius_m + 0.5)
+        middles.append(at)
+    return middles
 
 
 def rocks(draft: Draft, standing: Sequence[Rock]) -> None:
     """Put up layered rocks with scree about them, and offer slots on their tops."""
     if not standing:
         return
-    names = [f"rock_{k}" for k in range(len(standing))]
-    for name, rock in zip(names, standing, strict=True):
+    named = {f"rock_{k}": rock for k, rock in enumerate(standing)}
+    for name, rock in named.items():
         area = {"blob": [*rock.at, rock.radius_m, draft.whole(0, 1999, name), 0.22, 36]}
         draft.areas[name] = area | ({"long": [rock.long, rock.yaw_deg]} if rock.long > 1.0 else {})
-    step(draft, "bank_scree", areas=names, rise_m=0.9, reach_m=4)
-    draft.make("paint_scree", areas=names, material=draft.material("scree"), seed=draft.whole(0, 999, "scree"))
+    draft.step("bank_scree", areas=list(named), rise_m=0.9, reach_m=4)
+    draft.make("paint_scree", areas=list(named), material=draft.material("scree"), seed=draft.whole(0, 999, "scree"))
     cap = {"cap": draft.material("cap")} if "cap" in draft.palette.materials else {}
     draft.make(
-        "layered_rocks", bands=draft.material("bands").split("+"), **cap, **{"as": [f"{name}_top" for name in names]},
-        rocks=[{"area": n, "name": n, "height_m": r.height_m} for n, r in zip(names, standing, strict=True)],
+        "layered_rocks", bands=draft.material("bands").split("+"), **cap, **{"as": [f"{name}_top" for name in named]},
+        rocks=[{"area": n, "name": n, "height_m": r.height_m} for n, r in named.items()],
     )  # fmt: skip
-    for name, rock in zip(names, standing, strict=True):
+    for name, rock in named.items():
         draft.take(rock.shape(1.0))
         top = rock.shape(-0.26 * rock.radius_m - 0.14 * rock.height_m - 1.7)
         if top.is_empty or rock.radius_m / math.sqrt(rock.long) < 3.2:
             continue
-        along = math.radians(rock.yaw_deg)
         reach = rock.radius_m * math.sqrt(rock.long) * 0.42
         for f in (-1, 0, 1) if rock.radius_m > 5.0 else (0,):
-            x, y = rock.at[0] + f * reach * math.cos(along), rock.at[1] + f * reach * math.sin(along)
-            draft.slot("top", x, y, draft.number(0, 360, name, f), (3.0, 3.0), on=f"{name}_top")
+            at = ahead(rock.at, rock.yaw_deg, f * reach)
+            draft.slot("top", *at, draft.number(0, 360, name, f), (3.0, 3.0), on=f"{name}_top")
 
 
 def rocks_about(draft: Draft, number: int, radius_m: Point, height_m: Point, long: float = 2.0) -> list[Rock]:
     """Draw rocks on free ground, and take it."""
-    standing = []
+    drawn = []
     for k in range(number):
         radius = draft.number(*radius_m, "rock", k)
         ratio = draft.number(1.0, long, "rock", k, "long")
         at = spot_for(draft, radius * math.sqrt(ratio) + 1.0, "rock", k)
         if at is not None:
             high, yaw = draft.number(*height_m, "rock", k, "high"), draft.number(0, 180, "rock", k, "yaw")
-            rock = Rock(at, radius, high, ratio, yaw)
-            draft.take(rock.shape(1.5))
-            standing.append(rock)
-    return standing
+            drawn.append(Rock(at, radius, high, ratio, yaw))
+            draft.take(drawn[-1].shape(1.5))
+    return drawn
 
 
-def track(draft: Draft, name: str, line: shapely.LineString, width_m: float = 3.4, bank_m: float = 0.0) -> None:
-    """Lay a track along a named line, with ruts; offer slots on it (``track``) and beside it (``wayside``)."""
-    step(draft, "level_along", lines=[name], width_m=round(width_m * 0.8, 2), blend_m=3, smooth_m=12)
+def track(draft: Draft, line: shapely.LineString, width_m: float = 3.4, bank_m: float = 0.0) -> None:
+    """Lay a track along the line `track`, with ruts; offer slots on it (``track``) and beside it (``wayside``)."""
+    draft.step("level_along", lines=["track"], width_m=round(width_m * 0.8, 2), blend_m=3, smooth_m=12)
     if bank_m:
-        step(draft, "banks_beside", line=name, width_m=width_m, height_m=bank_m)
+        draft.step("banks_beside", line="track", width_m=width_m, height_m=bank_m)
     draft.section("The track")
-    draft.paint({"ribbon": name, "width_m": round(width_m + 0.8, 2), "round_ends": True}, draft.material("verge"))
-    draft.paint({"ribbon": name, "width_m": width_m, "round_ends": True}, draft.material("track"))
-    draft.make("strips_beside", line=name, offsets_m=[-0.85, 0.85], width_m=0.5, material=draft.material("rut"))
-    draft.make("keep_free", areas=[{"ribbon": name, "width_m": width_m}])
+    draft.paint({"ribbon": "track", "width_m": round(width_m + 0.8, 2), "round_ends": True}, draft.material("verge"))
+    draft.paint({"ribbon": "track", "width_m": width_m, "round_ends": True}, draft.material("track"))
+    draft.make("strips_beside", line="track", offsets_m=[-0.85, 0.85], width_m=0.5, material=draft.material("rut"))
+    draft.make("keep_free", areas=[{"ribbon": "track", "width_m": width_m}])
     for k in range(int(line.length // 9.0)):
-        at, side = 4.5 + 9.0 * k, 1 if draft.chance(0.5, "side", name, k) else -1
+        at, side = 4.5 + 9.0 * k, 1 if draft.chance(0.5, "side", "track", k) else -1
         x, y, yaw = pose_on(line, at, side, width_m / 2 + 3.0)
         if k % 2:
-            ahead = pose_on(line, at, 1, 0.0)
-            draft.slot("track", ahead[0], ahead[1], yaw - side * 90.0, (9.0, width_m))
-        if draft.is_free(shapely.Point(x, y).buffer(1.4)):
+            draft.slot("track", *pose_on(line, at, 1, 0.0)[:2], yaw - side * 90.0, (9.0, width_m))
+        if draft.has_room(x, y, 1.4):
             draft.slot("wayside", x, y, yaw, (4.4, 4.4))
     draft.take(line.buffer(width_m / 2 + 0.6))
 
 
 def houses_about(
-    draft: Draft, number: int, radius_m: float, *key: object, facing: shapely.LineString | Point | None = None,
-    reach_m: float = 1e3, least_m: float = 0.0,
+    draft: Draft, number: int, radius_m: float, key: str, facing: shapely.LineString | Point, reach_m: float,
+    least: int, what: str,
 ) -> list[Pose]:  # fmt: skip
-    """Find poses for houses on free ground, fronts to a way or a point that is near enough; level and take it."""
-    rng, w, d = draft.rng("houses", *key), draft.width_m / 2 - radius_m - 2.0, draft.depth_m / 2 - radius_m - 2.0
-    found: list[Pose] = []
+    """Find poses for houses on free ground, fronts to a way or a point within reach; level and take it."""
+    rng, w, d = draft.rng("houses", key), draft.width_m / 2 - radius_m - 2.0, draft.depth_m / 2 - radius_m - 2.0
+    poses: list[Pose] = []
     for _ in range(number * 90):
         x, y = round(float(rng.uniform(-w, w)), 1), round(float(rng.uniform(-d, d)), 1)
-        spot, yaw = shapely.Point(x, y), float(rng.uniform(0, 360))
-        if isinstance(facing, shapely.LineString):
-            to = facing.interpolate(facing.project(spot))
-        else:
-            to = shapely.Point(facing) if facing is not None else None
-        if to is not None:
-            yaw = math.degrees(math.atan2(to.y - y, to.x - x)) + float(rng.uniform(-8, 8))
-            if not least_m <= to.distance(spot) <= reach_m:
-                continue
-        if len(found) < number and draft.is_free(spot.buffer(radius_m)):
-            found.append((x, y, round(yaw % 360.0, 1)))
-            draft.take(spot.buffer(radius_m + 0.3))
-            step(draft, "level_area", area={"disc": [x, y, round(radius_m * 0.85, 1)]}, blend_m=3.5)
-    return found
+        rng.uniform(0, 360)  # Not used; without it all worlds would be others
+        spot = shapely.Point(x, y)
+        to = (
+            facing.interpolate(facing.project(spot))
+            if isinstance(facing, shapely.LineString)
+            else shapely.Point(facing)
+        )
+        yaw = towards((x, y), (to.x, to.y)) + float(rng.uniform(-8, 8))
+        if to.distance(spot) <= reach_m and len(poses) < number and draft.has_room(x, y, radius_m):
+            poses.append((x, y, round(yaw % 360.0, 1)))
+            draft.take_disc((x, y), radius_m + 0.3)
+            draft.step("level_area", area={"disc": [x, y, round(radius_m * 0.85, 1)]}, blend_m=3.5)
+    if len(poses) < least:
+        raise NoRoomError(f"no room for {what}")
+    return poses
 
 
-def beside(pose: Pose, ahead_m: float, left_m: float) -> Point:
-    """Point ahead of a pose and to its left."""
-    c, s = math.cos(math.radians(pose[2])), math.sin(math.radians(pose[2]))
-    return round(pose[0] + c * ahead_m - s * left_m, 2), round(pose[1] + s * ahead_m + c * left_m, 2)
-
-
-def landmarks(draft: Draft, near: Sequence[Point] = ()) -> None:
+def landmarks(draft: Draft, near: Sequence[Point]) -> None:
     """Place landmarks where there is much room, beside some points first, else where there is little."""
-    about_ = [beside((*at, 45.0 * k), 16.0, 0.0) for at in near for k in draft.shuffled(range(8), "landmark", *at)]
-    poses = [(*spot, float(draft.whole(0, 359, "landmark_yaw", *spot))) for spot in about_]
-    poses += anywhere(draft, 160)
-    wide = [pose for pose in poses if draft.is_free(shapely.Point(pose[:2]).buffer(6.0))]
+    spots = [ahead(at, 45.0 * k, 16.0) for at in near for k in draft.shuffled(range(8), "landmark", *at)]
+    poses = [(*spot, float(draft.whole(0, 359, "landmark_yaw", *spot))) for spot in spots] + anywhere(draft, 160)
+    wide = [pose for pose in poses if draft.has_room(*pose[:2], 6.0)]
     draft.section("Landmarks")
     for what, x, y in draft.landmark([*wide, *poses]):
         reach = max(extents_m(draft.catalogue, what)) / 2 + 0.8
-        step(draft, "level_area", area={"disc": [x, y, round(reach, 1)]}, blend_m=4)
+        draft.step("level_area", area={"disc": [x, y, round(reach, 1)]}, blend_m=4)

@@ -59,7 +59,7 @@ def is_world(name: str) -> bool:
 
 def world_of(name: str) -> World:
     """Read a world's name."""
-    found = _NAME.fullmatch(name)
-    if found is None or int(found["seed"]) > MAX_SEED:
+    match = _NAME.fullmatch(name)
+    if match is None or int(match["seed"]) > MAX_SEED:
         raise AssetError(f"{name!r} names no world: the form is U_Mall-1000, or U_Mall-h1000 of one that is held out")
-    return World(found["type"], int(found["seed"]), held_out=bool(found["held"]))
+    return World(match["type"], int(match["seed"]), held_out=bool(match["held"]))

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Any
 
+import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.scenes.worlds.blocks import Layout, lane_streets
 from aerialdojo_gen.scenes.worlds.draft import Draft
-from aerialdojo_gen.scenes.worlds.streets import Box, grid
-from aerialdojo_gen.scenes.worlds.wilds import Pose, beside, rolling, step
+from aerialdojo_gen.scenes.worlds.shapes import SIDES, Box, Point, Pose, ahead, beside, point
+from aerialdojo_gen.scenes.worlds.wilds import rolling
 
-Point = tuple[float, float]
 STOREY_M = 3.1
 
 
@@ -24,7 +23,7 @@ def built_up(
     """Lay streets, yards and open ground out on ground that rolls a little."""
     rolling(draft, relief_m, waves_m, 1.6)
     draft.level_things = False
-    lots, lanes, open_ = layout(draft, draft.width_m / 2, draft.depth_m / 2)
+    lots, lanes, open_ = layout(draft, *draft.half)
     draft.section("Streets and open ground")
     for box in open_:
         draft.paint(box.rounded(), draft.material("square", *box))
@@ -40,7 +39,7 @@ def camp(draft: Draft, open_: Sequence[Box]) -> None:
         things(draft, "camp", box.grown(-2.5), 6.2, (7.4, 7.0))
         things(draft, "small", box.grown(-1.5), 4.8, (2.4, 2.6))
     draft.section("Rubble")
-    if heaps := [name for name in draft.areas if name.startswith("heap_")]:
+    if heaps := _heaps(draft):
         draft.paint(heaps, draft.material("rubble"))
 
 
@@ -58,17 +57,23 @@ def shallow(draft: Draft, lot: Box, k: int, most_m: float, low: bool) -> Box:
     return front
 
 
+def flattened(draft: Draft, box: Box, k: int, name: str, share: float, is_heap: bool) -> None:
+    """Leave a yard on a lot, or a heap of rubble of so large a share of it besides."""
+    if is_heap:
+        radius = min(box.width, box.depth) * share
+        heap(draft, f"heap_{name}", point(*box.middle), radius, draft.number(1.2, 2.2, "heap", k))
+    things(draft, "yard", box, 5.2, (3.8, 3.8))
+
+
 def wreck(
     draft: Draft, box: Box, name: str, storeys: int, torn: int, *, toward: Point | None = None, lean_deg: float = 0.0,
     soot: float = 0.0,
 ) -> None:  # fmt: skip
     """Put up a damaged building with so many holes, the first towards a point; slots in its rooms (``torn``)."""
     long, deep = max(box.width, box.depth), min(box.width, box.depth)
-    yaw = 0.0 if box.width >= box.depth else 90.0
-    if draft.chance(0.5, name, "turned"):
-        yaw += 180.0
+    yaw = (90.0 if box.upright else 0.0) + (180.0 if draft.chance(0.5, name, "turned") else 0.0)
     pose = (round(box.middle[0], 2), round(box.middle[1], 2), yaw)
-    step(draft, "level_area", area=box.grown(0.4).rounded(), blend_m=2.5)
+    draft.step("level_area", area=box.grown(0.4).rounded(), blend_m=2.5)
     bites = [_bite(draft, pose, (long, deep), name, k, storeys, toward) for k in range(torn)]
     pitched = draft.chance(0.3, name, "pitched") and deep < 12.0
     draft.make(
@@ -124,12 +129,11 @@ def _bite(
 def heap(draft: Draft, name: str, at: Point, radius_m: float, height_m: float) -> None:
     """Pile rubble up, and offer slots on and beside it (``rubble``)."""
     draft.areas[name] = {"blob": [*at, round(radius_m, 1), draft.whole(0, 999, name), 0.3]}
-    step(draft, "heap", area=name, height_m=height_m, seed=draft.whole(0, 999, name, "lumps"))
+    draft.step("heap", area=name, height_m=height_m, seed=draft.whole(0, 999, name, "lumps"))
     draft.slot("rubble", *at, draft.number(0, 360, name), (3.4, 3.4), settle_m=0.5)
     for k in range(3):
-        turn = math.radians(120.0 * k + draft.number(0, 90, name, "beside"))
-        x, y = at[0] + (radius_m + 1.5) * math.cos(turn), at[1] + (radius_m + 1.5) * math.sin(turn)
-        draft.slot("rubble", x, y, draft.number(0, 360, name, k), (4.6, 3.6), settle_m=0.5)
+        spot = ahead(at, 120.0 * k + draft.number(0, 90, name, "beside"), radius_m + 1.5)
+        draft.slot("rubble", *spot, draft.number(0, 360, name, k), (4.6, 3.6), settle_m=0.5)
 
 
 def _rooms(
@@ -138,29 +142,25 @@ def _rooms(
     """Offer slots in rooms beside the first hole: each floor's nearest whole one."""
     long, deep = size_m
     count = max(round(long / 6.8), 1)
+    middles = [(k + 0.5) * long / count - long / 2 for k in range(count)]
     for floor in range(1, storeys):
         z = floor * STOREY_M
-        middles = [(k + 0.5) * long / count - long / 2 for k in range(count)]
 
         def whole(u: float, z: float = z) -> bool:
-            return all(math.hypot(u - b["x"], b["y"]) > _radius(b, z) + 2.2 for b in bites)
+            holes = ((b, np.interp(z, [b["z0_m"], b["z1_m"]], [b["foot_m"], b["head_m"]])) for b in bites)
+            return all(math.hypot(u - b["x"], b["y"]) > radius + 2.2 for b, radius in holes)
 
         rooms = sorted((u for u in middles if whole(u)), key=lambda u: abs(u - bites[0]["x"]))
         if rooms and draft.chance(0.7, name, "floor", floor):
             side = 1.0 if bites[0]["y"] > 0 else -1.0
-            x, y = beside(pose, rooms[0], side * deep * 0.12)
-            draft.slot("torn", x, y, draft.number(0, 360, name, floor), (2.2, 2.2), on=f"{name} + {z:.1f} + 0.03")
-
-
-def _radius(bite: dict[str, float], z: float) -> float:
-    share = min(max((z - bite["z0_m"]) / (bite["z1_m"] - bite["z0_m"]), 0.0), 1.0)
-    return bite["foot_m"] + share * (bite["head_m"] - bite["foot_m"])
+            spot = beside(pose, rooms[0], side * deep * 0.12)
+            draft.slot("torn", *spot, draft.number(0, 360, name, floor), (2.2, 2.2), on=f"{name} + {z:.1f} + 0.03")
 
 
 def pancaked(draft: Draft, box: Box, name: str, floors: int) -> None:
     """Pile up the floors of a building that fell, with slots on the highest (``fallen``), rubble about it."""
     x, y = (round(v, 2) for v in box.middle)
-    long, deep, yaw = max(box.width, box.depth), min(box.width, box.depth), 0.0 if box.width >= box.depth else 90.0
+    long, deep, yaw = max(box.width, box.depth), min(box.width, box.depth), 90.0 if box.upright else 0.0
     heap(draft, f"heap_{name}", (x, y), min(long, deep * 1.5) * 0.58, 1.1)
     draft.make("slab_pile", at=[x, y], yaw_deg=yaw, size_m=[round(long - 1.5, 1), round(deep - 1.5, 1)], count=floors,
                stream=name, wall=draft.material("wall", name), **{"as": name})  # fmt: skip
@@ -171,20 +171,21 @@ def pancaked(draft: Draft, box: Box, name: str, floors: int) -> None:
 
 def littered(draft: Draft) -> None:
     """Paint the heaps, and strew loose pieces about them and over the site."""
-    heaps = [name for name in draft.areas if name.startswith("heap_")]
-    w, d = draft.width_m / 2 - 2.0, draft.depth_m / 2 - 2.0
-    if heaps:
-        draft.make(
-            "strew_about_heaps", heaps=heaps, spacing_m=1.5, margin_m=2.0, brick=draft.material("wall", "bricks")
-        )
-    draft.make("strew_chunks", area=[-w, -d, w, d], spacing_m=4.2, stream="everywhere", size_m=[0.35, 0.8])
+    if heaps := _heaps(draft):
+        brick = draft.material("wall", "bricks")
+        draft.make("strew_about_heaps", heaps=heaps, spacing_m=1.5, margin_m=2.0, brick=brick)
+    area = list(draft.site.grown(-2.0))
+    draft.make("strew_chunks", area=area, spacing_m=4.2, stream="everywhere", size_m=[0.35, 0.8])
+
+
+def _heaps(draft: Draft) -> list[str]:
+    return [name for name in draft.areas if name.startswith("heap_")]
 
 
 def poles(draft: Draft, lanes: Sequence[Box]) -> None:
     """Put up poles that lean along the longest street, with slack wires between."""
     lane = max(lanes, key=lambda one: max(one.width, one.depth))
-    upright = lane.depth > lane.width
-    line = [(lane.x0 + 0.8, lane.y0 + f * lane.depth) if upright else (lane.x0 + f * lane.width, lane.y0 + 0.8)
+    line = [(lane.x0 + 0.8, lane.y0 + f * lane.depth) if lane.upright else (lane.x0 + f * lane.width, lane.y0 + 0.8)
             for f in (0.1, 0.35, 0.6, 0.85)]  # fmt: skip
     leaning = [
         [round(x, 1), round(y, 1), draft.number(4, 15, "pole", k), draft.number(0, 359, "pole", k, "yaw")]
@@ -196,18 +197,15 @@ def poles(draft: Draft, lanes: Sequence[Box]) -> None:
 def open_landmarks(draft: Draft, open_: Sequence[Box], shut: BaseGeometry) -> None:
     """Place landmarks on open ground, off what is shut."""
     draft.section("Landmarks")
-    free = [p for box in open_ for p in grid(box.grown(-2.6), 4.0) if not shut.intersects(shapely.Point(p))]
-    yaws = (0.0, 90.0, 180.0, 270.0)
-    draft.landmark([(*p, draft.pick(yaws, "landmark", *p)) for p in draft.shuffled(free, "landmarks")])
+    free = [p for box in open_ for p in box.grown(-2.6).grid(4.0) if not shut.intersects(shapely.Point(p))]
+    draft.landmark([(*p, draft.pick(SIDES, "landmark", *p)) for p in draft.shuffled(free, "landmarks")])
 
 
 def things(draft: Draft, kind: str, box: Box, step_m: float, room_m: Point) -> None:
     """Offer slots over a box, unevenly."""
-    from_, n_x, n_y = (box.x0, box.y0), max(int(box.width // step_m), 1), max(int(box.depth // step_m), 1)
-    for i in range(n_x):
-        for j in range(n_y):
-            rng: Any = draft.rng("things", kind, i, j, *box)
-            u, v = (float(rng.uniform(-0.6, 0.6)) for _ in range(2))
-            x = from_[0] + (i + 0.5) * box.width / n_x + u
-            y = from_[1] + (j + 0.5) * box.depth / n_y + v
-            draft.slot(kind, x, y, float(rng.uniform(0, 360)), room_m, settle_m=0.5)
+    n_x, n_y = max(int(box.width // step_m), 1), max(int(box.depth // step_m), 1)
+    for i, j in np.ndindex(n_x, n_y):
+        rng = draft.rng("things", kind, i, j, *box)
+        u, v = rng.uniform(-0.6, 0.6, 2)
+        x, y = box.x0 + (i + 0.5) * box.width / n_x + u, box.y0 + (j + 0.5) * box.depth / n_y + v
+        draft.slot(kind, float(x), float(y), float(rng.uniform(0, 360)), room_m, settle_m=0.5)

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import shapely
 
 from aerialdojo_gen.scenes.worlds.blocks import split
 from aerialdojo_gen.scenes.worlds.draft import Draft, NoRoomError
-from aerialdojo_gen.scenes.worlds.street_maps import pose_on
-from aerialdojo_gen.scenes.worlds.streets import Box, grid
-from aerialdojo_gen.scenes.worlds.wilds import Pose, about, beside, point, smoothed, step
+from aerialdojo_gen.scenes.worlds.shapes import SIDES, Box, Point, Pose, ahead, beside, point, pose_on, smoothed
+from aerialdojo_gen.scenes.worlds.wilds import about
 
-Point = tuple[float, float]
 _TRIMS = ["#f2efe6", "#5a3f2c", "#2f5a46"]
-_SIDES = (0.0, 90.0, 180.0, 270.0)
 # Of the feet of what is afloat, of cars, and of what stands in gardens, over the water.
 _HEIGHTS_M = {"moored": -0.12, "afloat": -0.12, "drowned": -0.55, "garden": -0.45}
 
@@ -33,11 +30,11 @@ class _Land(NamedTuple):
 
 def write(draft: Draft) -> None:
     """Raise dykes and mounds out of the water, drown houses, and set boats, tents and what drifts about them."""
-    w, d = draft.width_m / 2, draft.depth_m / 2
+    w, d = draft.half
     land = _TOPOLOGIES[draft.topology](draft, w, d)
     mounds = land.mounds
     draft.head["palette"] = {role: draft.material(role) for role in ("mud", "bank", "foam", "stain")}
-    step(draft, "water_level")
+    draft.step("water_level")
     _banks(draft, land)
     draft.section("Landmarks")
     draft.landmark([(*at, draft.number(0, 360, "landmark", *at)) for at, _ in draft.shuffled(mounds, "landmarks")])
@@ -45,7 +42,7 @@ def write(draft: Draft) -> None:
         if radius > 8.0:
             about(draft, "mound", at, (radius - 3.0, radius - 1.6), 7, (7.0, 6.6))
         about(draft, "small", at, (radius - 2.6, radius - 1.0), 7, (2.6, 2.6))
-        draft.take(shapely.Point(at).buffer(radius + 5.0))
+        draft.take_disc(at, radius + 5.0)
     draft.section("Drowned houses")
     _houses(draft, land.houses)
     _flats(draft, land.flats)
@@ -55,32 +52,29 @@ def write(draft: Draft) -> None:
 
 
 def _banks(draft: Draft, land: _Land) -> None:
-    dykes, mounds = land.dykes, land.mounds
-    high = draft.number(2.4, 3.6, "dyke")
-    names = []
-    for k, line in enumerate(dykes):
+    mounds, high = land.mounds, draft.number(2.4, 3.6, "dyke")
+    crests = [f"crest_{k}" for k in range(len(land.dykes))]
+    for k, line in enumerate(land.dykes):
         draft.lines[f"dyke_{k}"] = {"points": [list(p) for p in line], "smooth": 3}
         draft.areas[f"crest_{k}"] = {"ribbon": f"dyke_{k}", "width_m": 4}
-        names.append(f"crest_{k}")
-        step(draft, "raise_bank", area=f"crest_{k}", to_m=high)
+        draft.step("raise_bank", area=f"crest_{k}", to_m=high)
     for k, (at, radius) in enumerate(mounds):
         draft.areas[f"mound_{k}"] = {"disc": [*at, radius]}
-        step(draft, "raise_bank", area=f"mound_{k}", to_m=draft.number(0.8, 1.8, "mound", k), slope_m=4)
+        draft.step("raise_bank", area=f"mound_{k}", to_m=draft.number(0.8, 1.8, "mound", k), slope_m=4)
     draft.section("Water, banks and mounds")
     for line in land.currents:
         draft.make("streaks", paths=[[list(p) for p in line]], width_m=draft.number(5, 9, "current"))
     for k in range(len(mounds)):
         draft.make("paint_island", area=f"mound_{k}", slope_m=4, way=draft.material("mound", k))
-    if names:
-        draft.make("paint_bank", crests=names, way=draft.material("track"))
-    for line in dykes:
-        way = smoothed(line, 3)
+    if crests:
+        draft.make("paint_bank", crests=crests, way=draft.material("track"))
+    ways = [smoothed(line, 3) for line in land.dykes]
+    for way in ways:
         for k in range(int((way.length - 6.0) // 7.0)):
             x, y, yaw = pose_on(way, 5.0 + 7.0 * k, 1, 0.0)
             draft.slot("dyke", x, y, yaw + 90.0, (9.0, 3.4))
         draft.take(way.buffer(8.8))
-    for line in dykes:
-        way = smoothed(line, 3)
+    for way in ways:
         for k in range(int((way.length - 6.0) // 9.0)):
             x, y, _ = pose_on(way, 7.0 + 9.0 * k, 1 if draft.chance(0.5, "dyke", k) else -1, 12.4)
             _wet(draft, "moored", (x, y), draft.number(0, 360, "moored", k))
@@ -126,36 +120,35 @@ def _flats(draft: Draft, flats: Sequence[tuple[Box, float]]) -> None:
             roof=draft.material("flat_roof", k), parapet_m=0.25, **{"as": f"{name}_roof"},
         )  # fmt: skip
         draft.take(box.shape())
-        for x, y in grid(box.grown(-1.3), 4.0):
+        for x, y in box.grown(-1.3).grid(4.0):
             draft.slot("roof", x, y, draft.number(0, 360, name, x, y), (3.6, 3.6), on=f"{name}_roof")
         for off in (-0.3, 0.3):
-            x, y = beside((*box.middle, facing), 0.0, off * max(box.width, box.depth))
+            at = ahead(box.middle, facing, 0.0, off * max(box.width, box.depth))
             out = (box.width if facing % 180.0 == 0 else box.depth) / 2 + 3.4
-            _wet(draft, "moored", beside((x, y, facing), out, 0.0), facing + 90.0)
+            _wet(draft, "moored", ahead(at, facing, out), facing + 90.0)
 
 
 def _water(draft: Draft, w: float, d: float) -> None:
     """Offer slots on what is open water."""
-    rng, found = draft.rng("water"), list[shapely.Point]()
+    rng, spots = draft.rng("water"), list[shapely.Point]()
     for _ in range(400):
         spot = shapely.Point(float(rng.uniform(-w + 4, w - 4)), float(rng.uniform(-d + 4, d - 4)))
         yaw, kind = float(rng.uniform(0, 360)), ("afloat", "drowned", "garden")[int(rng.integers(3))]
-        if len(found) < 46 and all(spot.distance(o) > 7.0 for o in found) and draft.is_free(spot.buffer(2.7)):
-            found.append(spot)
+        if len(spots) < 46 and all(spot.distance(o) > 7.0 for o in spots) and draft.is_free(spot.buffer(2.7)):
+            spots.append(spot)
             _wet(draft, kind, (spot.x, spot.y), yaw)
 
 
 def _trees(draft: Draft) -> None:
     """Let treetops stand out of the water, and wreckage drift."""
     draft.section("Trees in the water, and what drifts")
-    w, d = draft.width_m / 2 - 2.5, draft.depth_m / 2 - 2.5
     banks = [{"area": name, "grow_m": 9.5 if name.startswith("crest") else 6.5} for name in draft.areas]
-    open_ = {"box": [-w, -d, w, d], **({"minus": banks} if banks else {})}
+    open_ = {"box": list(draft.site.grown(-2.5)), **({"minus": banks} if banks else {})}
     trees, limit = draft.material("trees").split("+"), round(draft.knob("trees"))
     pattern = {"of": trees, "scatter": open_, "spacing_m": 9, "limit": limit, "stream": "trees"}
     draft.add({"pattern": pattern, "on": -0.5, "fit": "skip"})
-    debris, place = ["floating_debris"], "adrift on the flood"
-    draft.make("drift", area=open_, categories=debris, spacing_m=10, limit=8, place=place)
+    afloat = {"categories": ["floating_debris"], "spacing_m": 10, "limit": 8, "place": "adrift on the flood"}
+    draft.make("drift", area=open_, **afloat)
 
 
 def _row(draft: Draft, u0: float, u1: float, v: float, yaw: float, key: str) -> list[Pose]:
@@ -198,11 +191,10 @@ def _town(draft: Draft, w: float, d: float) -> _Land:
     mounds = [(point(*box.middle), 8.6) for box in near[:2]]
     flats = []
     for box in near[2:]:
-        inner, (x, y) = box.grown(-1.2), box.middle
+        inner = box.grown(-1.2)
         wide = min(inner.width, draft.number(11, 16, "wide", *box))
         deep = min(inner.depth, draft.number(9, 13, "deep", *box))
-        front = draft.pick(_SIDES, "front", *box)
-        flats.append((Box(x - wide / 2, y - deep / 2, x + wide / 2, y + deep / 2), front))
+        flats.append((Box.about(*box.middle, wide, deep), draft.pick(SIDES, "front", *box)))
     return _Land([], mounds, [], flats, [[(-w, 0.0), (w, 0.0)]])
 
 
@@ -228,16 +220,16 @@ def _mounds(draft: Draft, w: float, d: float) -> _Land:
         mounds.append((at, draft.number(7.5, 9.5, "radius", k)))
         for j in range(3):
             yaw = draft.number(0, 90, "house", k) + 120.0 * j
-            x, y = beside((*at, yaw), 22.0, 0.0)
+            x, y = ahead(at, yaw, 22.0)
             if k % 2:
                 houses.append((x, y, yaw + 180.0))
             else:
-                flats.append((Box(x - 5.0, y - 4.5, x + 5.0, y + 4.5), draft.pick(_SIDES, "flat", k, j)))
+                flats.append((Box.about(x, y, 10.0, 9.0), draft.pick(SIDES, "flat", k, j)))
     (a, _), (b, _) = mounds[0], mounds[1]
     middle = ((a[0] + b[0]) / 2 + draft.number(-6, 6, "bow"), (a[1] + b[1]) / 2)
     return _Land([[a, middle, b]], mounds, houses, flats, [])
 
 
-_TOPOLOGIES: dict[str, Callable[[Draft, float, float], _Land]] = {
+_TOPOLOGIES = {
     "street": _street, "polder": _polder, "town": _town, "river": _river, "mounds": _mounds,
 }  # fmt: skip

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from itertools import product
 
 import shapely
 from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.scenes.worlds.draft import Draft, NoRoomError
-from aerialdojo_gen.scenes.worlds.shores import afloat, ahead, jetty, walls
-from aerialdojo_gen.scenes.worlds.streets import Box, grid
-from aerialdojo_gen.scenes.worlds.wilds import smoothed
+from aerialdojo_gen.scenes.worlds.shapes import SIDES, Box, Point, Pose, ahead, heading, smoothed, towards
+from aerialdojo_gen.scenes.worlds.shores import afloat, jetty, walls
 
-Point = tuple[float, float]
-_Pose = tuple[float, float, float]
 _NAMES = ("FISH MARKET", "PORT OFFICE", "SHED", "ICE HOUSE", "CUSTOMS", "ROPE WORKS", "COLD STORE", "SHIP CHANDLER",
           "BOATYARD", "FERRY", "GRAIN STORE", "SAILMAKER", "NORTH QUAY", "TIMBER", "DRY DOCK", "COFFEE")  # fmt: skip
 
@@ -23,7 +21,7 @@ class _Port:
     """A harbour laid out with its water in the south, and mirrored as the seed has it."""
 
     def __init__(self, draft: Draft) -> None:
-        self.draft, self.w, self.d = draft, draft.width_m / 2, draft.depth_m / 2
+        self.draft, (self.w, self.d) = draft, draft.half
         self.fx, self.fy = draft.pick([1.0, -1.0], "flip_x"), draft.pick([1.0, -1.0], "flip_y")
         self.land: BaseGeometry = shapely.Polygon()
         self.halls = 0
@@ -34,13 +32,12 @@ class _Port:
 
     def box(self, x0: float, y0: float, x1: float, y1: float) -> Box:
         """Box as the plan has it."""
-        (a, b), (c, e) = self.at(x0, y0), self.at(x1, y1)
-        return Box(min(a, c), min(b, e), max(a, c), max(b, e))
+        return Box(*shapely.LineString([self.at(x0, y0), self.at(x1, y1)]).bounds)
 
     def yaw(self, yaw_deg: float) -> float:
         """Direction as the plan has it."""
         c, s = self.fx * math.cos(math.radians(yaw_deg)), self.fy * math.sin(math.radians(yaw_deg))
-        return round(math.degrees(math.atan2(s, c)) % 360.0, 1)
+        return round(towards((0.0, 0.0), (c, s)) % 360.0, 1)
 
     def line(self, points: Sequence[Point]) -> list[list[float]]:
         """Points as the plan has them."""
@@ -72,16 +69,16 @@ def write(draft: Draft) -> None:
     draft.head["placing"] = {"margin_m": 0.3}
     heads = _TOPOLOGIES[draft.topology](port, port.w, port.d)
     afloat(draft, port.land, 9)
-    draft.take(shapely.box(-port.w, -port.d, port.w, port.d).difference(port.land))
+    draft.take(draft.site.shape().difference(port.land))
     draft.section("Landmarks")
     if draft.chance(0.8, "lighthouse"):
         draft.landmark(heads, of=["lighthouse"])
     whole = Box(*port.land.bounds)
-    room = [(*p, port.yaw(-90)) for p in draft.shuffled(grid(whole.grown(-6), 7.0), "landmarks")]
+    room = [(*p, port.yaw(-90)) for p in draft.shuffled(whole.grown(-6).grid(7.0), "landmarks")]
     draft.landmark([*heads, *room], of=[what for what in draft.kind.landmarks if what != "container_crane"])
-    free = [p for p in grid(whole.grown(-4.0), 5.6) if draft.is_free(shapely.Point(p).buffer(2.9))]
+    free = [p for p in whole.grown(-4.0).grid(5.6) if draft.has_room(*p, 2.9)]
     for x, y in draft.shuffled(free, "yard")[: round(draft.knob("goods"))]:
-        draft.slot("yard", x, y, draft.pick([0.0, 90.0, 180.0, 270.0], "yard", x, y), (6.4, 4.6))
+        draft.slot("yard", x, y, draft.pick(SIDES, "yard", x, y), (6.4, 4.6))
     draft.fill_slots()
 
 
@@ -90,7 +87,7 @@ def _edge(port: _Port, a: Point, b: Point, *, ships: bool = True, key: str = "")
     draft = port.draft
     line = port.line([a, b] if port.fx * port.fy > 0 else [b, a])
     draft.make("fenders", edges=[line])
-    length, yaw = math.hypot(b[0] - a[0], b[1] - a[1]), math.degrees(math.atan2(b[1] - a[1], b[0] - a[0]))
+    length, yaw = math.dist(a, b), towards(a, b)
     for k in range(int(length // 6.2)):
         port.slot("edge", *ahead(a, yaw, 3.1 + 6.2 * k, 1.5), yaw - 90, (2.6, 2.9))
     for k in range(int(length // 15.0)):
@@ -102,8 +99,8 @@ def _edge(port: _Port, a: Point, b: Point, *, ships: bool = True, key: str = "")
         long, off = (45.0, 5.3) if big else (14.4, 3.6)
         turn = draft.pick([0.0, 180.0], "turn", key, k)
         if at + long < length + 1.0:
-            x, y = ahead(a, yaw, at + long / 2, -off)
-            port.slot("ship" if big else "berth", x, y, yaw + turn, (44.6, 9.2) if big else (14.2, 5.6), on="sea")
+            berth = ahead(a, yaw, at + long / 2, -off)
+            port.slot("ship" if big else "berth", *berth, yaw + turn, (44.6, 9.2) if big else (14.2, 5.6), on="sea")
         at, k = at + long + 3.0, k + 1
     if ships:
         strip = [port.at(*ahead(a, yaw, s, -o)) for s, o in ((0, 0), (length, 0), (length, 11.0), (0, 11.0))]
@@ -117,7 +114,7 @@ def _jetties(port: _Port, xs: Sequence[float], y: float, longest_m: float) -> No
         jetty(port.draft, port.land, port.at(x, y), port.yaw(-90), length)
 
 
-def _mole(port: _Port, points: Sequence[Point]) -> list[_Pose]:
+def _mole(port: _Port, points: Sequence[Point]) -> list[Pose]:
     """Heap up a breakwater with a paved way; its head has room for a lighthouse, which is given."""
     draft, path = port.draft, smoothed([port.at(*p) for p in points], 2)
     draft.section("The breakwater")
@@ -127,9 +124,8 @@ def _mole(port: _Port, points: Sequence[Point]) -> list[_Pose]:
     head = port.box(x - 6.2, y - 6.2, x + 6.2, y + 6.2)
     draft.paint(head.rounded(), draft.material("paving"), rise_m="quay", edge=draft.material("edge"))
     for k in range(int((path.length - 12) // 9)):
-        p, q = path.interpolate(6 + 9 * k), path.interpolate(6.5 + 9 * k)
-        yaw = math.degrees(math.atan2(q.y - p.y, q.x - p.x))
-        draft.slot("mole", p.x, p.y, yaw + 90, (1.8, 3.0), on="quay")
+        px, py, yaw = heading(path, 6 + 9 * k)
+        draft.slot("mole", px, py, yaw + 90, (1.8, 3.0), on="quay")
     rocks = path.difference(port.land.union(head.shape())).buffer(6.0)
     draft.take(rocks.difference(head.shape()))
     port.land = port.land.union(head.shape())
@@ -153,8 +149,7 @@ def _hall(port: _Port, x0: float, y0: float, x1: float, y1: float, facing: float
         v = 4.4 * (j + 0.5 - int(wide // 4.4) / 2)
         port.slot("front", *ahead(((x0 + x1) / 2, (y0 + y1) / 2), facing, out + 1.8, v), facing, (2.4, 3.6))
     if not pitched:
-        for x, y in grid(box.grown(-1.8), 5.0):
-            draft.slot("roof", x, y, port.yaw(facing), (3.2, 3.4), on=f"hall_{k}")
+        draft.slots_over("roof", box.grown(-1.8), 5.0, (3.2, 3.4), yaw_deg=port.yaw(facing), on=f"hall_{k}")
 
 
 def _halls(port: _Port, x0: float, x1: float, y: float, depth_m: float) -> None:
@@ -187,12 +182,11 @@ def _houses(port: _Port, x0: float, x1: float, y: float) -> None:
 def _garden(port: _Port, box: tuple[float, float, float, float]) -> None:
     """Plant a strip of green behind the houses."""
     port.paved(box, "green")
-    area = port.box(*box).grown(-1.6)
-    port.draft.add({"pattern": {"of": port.draft.material("trees").split("+"), "scatter": area.rounded(),
-                                "spacing_m": 6.5, "limit": 18}, "fit": "skip"})  # fmt: skip
-    port.draft.take(area.shape())
-    for x, y in grid(area, 8.0):
-        port.draft.slot("garden", x, y, port.yaw(-90), (3.0, 3.0))
+    draft, area = port.draft, port.box(*box).grown(-1.6)
+    trees = draft.material("trees").split("+")
+    draft.add({"pattern": {"of": trees, "scatter": area.rounded(), "spacing_m": 6.5, "limit": 18}, "fit": "skip"})
+    draft.take(area.shape())
+    draft.slots_over("garden", area, 8.0, (3.0, 3.0), yaw_deg=port.yaw(-90))
 
 
 def _road(port: _Port, y: float) -> None:
@@ -208,19 +202,18 @@ def _road(port: _Port, y: float) -> None:
 def _stacks(port: _Port, x0: float, y0: float, x1: float, y1: float) -> None:
     """Stack containers in blocks with lanes between them."""
     draft, tall = port.draft, round(port.draft.knob("tiers"))
-    stacks = []
-    for i in range(int((x1 - x0 + 7.0) // 33.0)):
-        for j in range(int((y1 - y0 + 7.0) // 20.5)):
-            box = port.box(x0 + 33.0 * i, y0 + 20.5 * j, x0 + 33.0 * i + 25.4, y0 + 20.5 * j + 13.2)
-            rng = draft.rng("stack", i, j)
-            tiers = [[int(n) for n in rng.integers(0, tall + 1, 5)] for _ in range(2)]
-            stacks.append({"at": [box.x0, box.y0], "tiers": tiers})
-            draft.make("outline_marks", areas=[box.grown(0.5).rounded()], material="marking_yellow", rise_m="quay")
-            draft.take(box.grown(0.6).shape())
+    stacks, columns = [], int((x1 - x0 + 7.0) // 33.0)
+    for i, j in product(range(columns), range(int((y1 - y0 + 7.0) // 20.5))):
+        box = port.box(x0 + 33.0 * i, y0 + 20.5 * j, x0 + 33.0 * i + 25.4, y0 + 20.5 * j + 13.2)
+        stacks.append(
+            {"at": [box.x0, box.y0], "tiers": draft.rng("stack", i, j).integers(0, tall + 1, (2, 5)).tolist()}
+        )
+        draft.make("outline_marks", areas=[box.grown(0.5).rounded()], material="marking_yellow", rise_m="quay")
+        draft.take(box.grown(0.6).shape())
     if not stacks:
         raise NoRoomError("no room for containers")
     draft.make("container_stacks", on="quay", stacks=stacks)
-    masts = [port.at(x0 + 33.0 * i - 3.6, y0 - 3.6) for i in range(1, int((x1 - x0 + 7.0) // 33.0))]
+    masts = [port.at(x0 + 33.0 * i - 3.6, y0 - 3.6) for i in range(1, columns)]
     if masts:
         draft.make("light_masts", at=[list(m) for m in masts], foot_m="quay", top_m=draft.number(15, 18, "masts"))
         draft.take(shapely.MultiPoint(masts).buffer(1.2))
@@ -228,8 +221,8 @@ def _stacks(port: _Port, x0: float, y0: float, x1: float, y1: float) -> None:
 
 def _heaps(port: _Port, at: Sequence[Point]) -> None:
     draft = port.draft
-    heaps = [[*port.at(*p), draft.number(3.6, 5.4, "heap", *p), draft.material("bulk", *p)] for p in at]
-    if heaps:
+    if at:
+        heaps = [[*port.at(*p), draft.number(3.6, 5.4, "heap", *p), draft.material("bulk", *p)] for p in at]
         draft.make("bulk_heaps", on="quay", heaps=heaps)
         draft.take(shapely.MultiPoint([port.at(*p) for p in at]).buffer(6.4))
 
@@ -243,7 +236,7 @@ def _crane(port: _Port, a: Point, b: Point) -> None:
         port.draft.landmark(port.draft.shuffled(spots, "crane_spots"), of=["container_crane"])
 
 
-def _terminal(port: _Port, w: float, d: float) -> list[_Pose]:
+def _terminal(port: _Port, w: float, d: float) -> list[Pose]:
     """One long quay with container cranes, stacks behind it and a breakwater before it."""
     q = -d * 0.22
     port.quays([(-w, q, w, d)])
@@ -257,7 +250,7 @@ def _terminal(port: _Port, w: float, d: float) -> list[_Pose]:
     return _mole(port, [(w - 5, q - 1), (w - 8, -d + 14), (w * 0.55, -d + 8), (w * 0.12, -d + 9)])
 
 
-def _basin(port: _Port, w: float, d: float) -> list[_Pose]:
+def _basin(port: _Port, w: float, d: float) -> list[Pose]:
     """Quays about three sides of a basin with jetties, halls and houses behind."""
     q, low, left, right = d * 0.12, -d * 0.5, -w * 0.62, w * 0.6
     port.quays([(-w, q, w, d), (-w, low, left, q), (right, low, w, q)])
@@ -275,7 +268,7 @@ def _basin(port: _Port, w: float, d: float) -> list[_Pose]:
     return _mole(port, [(left - 6, low + 1), (left - 5, -d + 16), (left + 16, -d + 9), (w * 0.05, -d + 9)])
 
 
-def _fingers(port: _Port, w: float, d: float) -> list[_Pose]:
+def _fingers(port: _Port, w: float, d: float) -> list[Pose]:
     """Two or three broad piers out from a shore, ships at both sides of them, sheds upon them."""
     q, low, wide = d * 0.3, -d * 0.68, port.draft.number(23, 26, "wide")
     number = 3 if w > 84 else 2
@@ -296,7 +289,7 @@ def _fingers(port: _Port, w: float, d: float) -> list[_Pose]:
     return [(*port.at(x + wide / 2, low + 9), port.yaw(-90)) for x in (xs[0], xs[-1])]
 
 
-def _marina(port: _Port, w: float, d: float) -> list[_Pose]:
+def _marina(port: _Port, w: float, d: float) -> list[Pose]:
     """A front of houses, jetties before it, a boatyard at its end, a mole about it."""
     q, low, yard = d * 0.3, -d * 0.42, w * 0.56
     port.quays([(-w, q, w, d), (yard, low, w, q)])
@@ -314,7 +307,7 @@ def _marina(port: _Port, w: float, d: float) -> list[_Pose]:
     return _mole(port, [(-w + 6, q - 1), (-w + 6, -d + 18), (-w + 20, -d + 9), (-w * 0.1, -d + 9)])
 
 
-def _channel(port: _Port, w: float, d: float) -> list[_Pose]:
+def _channel(port: _Port, w: float, d: float) -> list[Pose]:
     """Quays at both sides of a channel: halls on one, containers or bulk goods on the other."""
     q, south = d * 0.26, -d * 0.34
     end = w * port.draft.number(0.4, 0.6, "end")
@@ -328,7 +321,7 @@ def _channel(port: _Port, w: float, d: float) -> list[_Pose]:
     return [(*port.at(end - 7, -d + 12), port.yaw(90))]
 
 
-def _causeway(port: _Port, w: float, d: float) -> list[_Pose]:
+def _causeway(port: _Port, w: float, d: float) -> list[Pose]:
     """A terminal out in the water, joined to the shore by a causeway."""
     shore, x0, x1, y0, y1 = d * 0.55, -w * 0.6, w * 0.62, -d * 0.5, d * 0.14
     at = port.draft.number(x0 + 14, x1 - 14, "causeway")
@@ -344,7 +337,7 @@ def _causeway(port: _Port, w: float, d: float) -> list[_Pose]:
     return [(*port.at(x1 - 8, y1 - 9), port.yaw(0))]
 
 
-_TOPOLOGIES: dict[str, Callable[[_Port, float, float], list[_Pose]]] = {
+_TOPOLOGIES = {
     "terminal": _terminal, "basin": _basin, "fingers": _fingers, "marina": _marina, "channel": _channel,
     "causeway": _causeway,
 }  # fmt: skip

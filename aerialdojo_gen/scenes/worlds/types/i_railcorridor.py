@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import shapely
 
-from aerialdojo_gen.scenes.worlds.blocks import SIDES
 from aerialdojo_gen.scenes.worlds.draft import Draft
-from aerialdojo_gen.scenes.worlds.streets import Box, block_building, grid, street_along
+from aerialdojo_gen.scenes.worlds.shapes import SIDES, Box
+from aerialdojo_gen.scenes.worlds.streets import block_building, street_along
 
 _SPACING_M, _EDGE_M = 4.6, 1.75  # From track to track, and from a track to a platform
 _CARS_M = {"carriage": 18.8, "wagon": 13.6, "tank": 13.4}
@@ -26,11 +26,10 @@ class _Band(NamedTuple):
 
 def write(draft: Draft) -> None:
     """Lay the strips out, then tracks and trains, platforms, what crosses, the town, and what stands in the yards."""
-    w, d, flip = draft.width_m / 2, draft.depth_m / 2, draft.pick([1, -1], "flip")
+    (w, d), flip = draft.half, draft.pick([1, -1], "flip")
     draft.floors |= {"platform": 1.15, "rail": 0.56, "bed": 0.35, "deck": 6.8}
     bands, crossing, bridge = _TOPOLOGIES[draft.topology](draft, d)
-    tracks: list[tuple[float, float, float]] = []
-    boxes: list[tuple[str, Box]] = []
+    tracks, boxes = list[tuple[float, float, float]](), list[tuple[str, Box]]()
     last, y = "", -d
     for band in bands:
         if band.kind == "track":
@@ -43,21 +42,24 @@ def write(draft: Draft) -> None:
             y += band.wide_m
         last = band.kind
     _tracks(draft, tracks, w, crossing)
-    for kind, box in boxes:
-        if kind == "platform":
-            _platform(draft, box)
+    ys, platforms = [t[0] for t in tracks], [box for kind, box in boxes if kind == "platform"]
+    for platform in platforms:
+        _platform(draft, platform)
     if crossing is not None:
-        _crossing(draft, crossing, [t[0] for t in tracks], d)
+        _crossing(draft, crossing, ys, d)
     if bridge is not None:
-        _footbridge(draft, bridge, [b for kind, b in boxes if kind == "platform"], [t[0] for t in tracks])
+        _footbridge(draft, bridge, platforms)
     for kind, box in boxes:
         if kind == "street":
             draft.section("The street")
-            street_along(draft, [(-w, box.middle[1]), (w, box.middle[1])])
-    _landmarks(draft, [box for kind, box in boxes if kind in ("yard", "town", "green")])
+            street_along(draft, box.middle[1])
+    draft.section("Landmarks")
+    open_ = [box for kind, box in boxes if kind in ("yard", "town", "green")]
+    spots = draft.shuffled((p for box in open_ for p in box.grown(-2.8).grid(5.0)), "spots")
+    draft.landmark([(*p, draft.pick(SIDES, "landmark", *p)) for p in spots])
     for n, (kind, box) in enumerate(boxes):
         if kind == "town":
-            _town(draft, box, n, 90.0 * (1 if box.middle[1] * flip < 0 else -1) % 360.0, [t[0] for t in tracks])
+            _town(draft, box, n, 270.0 if min(ys) < box.middle[1] else 90.0)
         elif kind == "yard":
             _yard(draft, box, n)
         elif kind == "green":
@@ -88,19 +90,19 @@ def _train(draft: Draft, k: int, y: float, x0: float, x1: float, crossing: float
         draft.slot("alone", draft.number(x0 + 5, x1 - 5, "alone", k), y, 0.0, (4.0, 3.2), on="rail")
         return
     number, turn = draft.whole(2, 4, "cars", k), draft.pick([0.0, 180.0], "turn", k)
-    length = 18.0 + number * _CARS_M[kind]
-    if length > x1 - x0:
-        number = int((x1 - x0 - 18.0) // _CARS_M[kind])
-        length = 18.0 + number * _CARS_M[kind]
+    car_m = _CARS_M[kind]
+    if 18.0 + number * car_m > x1 - x0:
+        number = int((x1 - x0 - 18.0) // car_m)
+    length = 18.0 + number * car_m
     start = x0 + draft.number(0, max(0.0, x1 - x0 - length), "start", k)
     if number < 1 or (crossing is not None and start < crossing + 5.0 and start + length > crossing - 5.0):
         start = crossing + 6.0 if crossing is not None else start
-        number = min(number, int((x1 - start - 18.0) // _CARS_M[kind]))
+        number = min(number, int((x1 - start - 18.0) // car_m))
         if number < 1:
             return
     draft.slot("engine", start + 9.0, y, turn, (17.4, 3.3), on="rail")
     for j in range(number):
-        draft.slot(kind, start + 18.0 + (j + 0.5) * _CARS_M[kind], y, 0.0, (18.6, 3.3), on="rail")
+        draft.slot(kind, start + 18.0 + (j + 0.5) * car_m, y, 0.0, (18.6, 3.3), on="rail")
 
 
 def _platform(draft: Draft, box: Box) -> None:
@@ -139,21 +141,21 @@ def _crossing(draft: Draft, x: float, ys: Sequence[float], d: float) -> None:
     draft.add({"place": [["level_crossing_barrier", *end] for end in ends], "fit": "skip"})
 
 
-def _footbridge(draft: Draft, x: float, platforms: Sequence[Box], ys: Sequence[float]) -> None:
+def _footbridge(draft: Draft, x: float, platforms: Sequence[Box]) -> None:
     """Put up a footbridge from the first platform to the last, with stairs down to each."""
-    low, high = min(p.middle[1] for p in platforms) - 1.4, max(p.middle[1] for p in platforms) + 1.4
+    middles = [p.middle[1] for p in platforms]
+    low, high = min(middles) - 1.4, max(middles) + 1.4
     draft.section("The footbridge")
-    frame, wide = draft.material("frame"), 3.2
-    x0, x1 = round(x - wide / 2, 2), round(x + wide / 2, 2)
-    y0, y1 = round(low, 2), round(high, 2)
-    feet = [[u, round(p.middle[1], 2)] for p in platforms for u in (x0 + 0.3, x1 - 0.3)]
+    frame = draft.material("frame")
+    x0, y0, x1, y1 = Box(x - 1.6, low, x + 1.6, high).rounded()
+    feet = [[u, round(y, 2)] for y in middles for u in (x0 + 0.3, x1 - 0.3)]
     parts = [
         {"shape": "block", "role": "boards:#9a8a72", "corners": [x0, y0, x1, y1], "z": ["deck - 0.1", "deck"]},
         {"shape": "block", "role": frame, "corners": [x0, y0, x1, y1], "z": ["deck - 0.45", "deck - 0.1"]},
         {"make": "round_columns", "at": feet, "z": ["platform", "deck - 0.4"], "radius_m": 0.2, "material": frame},
     ]  # fmt: skip
     for u, opened in ((x0 + 0.05, False), (x1 - 0.05, True)):
-        gaps = [v for p in platforms for v in (p.middle[1] - 1.1, p.middle[1] + 1.1)] if opened else []
+        gaps = [v for y in middles for v in (y - 1.1, y + 1.1)] if opened else []
         cuts = [y0, *gaps, y1]
         for a, b in zip(cuts[::2], cuts[1::2], strict=True):
             if b - a > 0.4:
@@ -161,44 +163,34 @@ def _footbridge(draft: Draft, x: float, platforms: Sequence[Box], ys: Sequence[f
                               "height_m": 1.2, "frame": frame, "pane": "glass"})  # fmt: skip
     draft.add({"node": "station_footbridge", "parts": parts})
     stairs = [
-        {"make": "stairs", "foot": [round(x1 + 10.5, 2), round(p.middle[1], 2)], "yaw_deg": 180, "width_m": 2.0,
+        {"make": "stairs", "foot": [round(x1 + 10.5, 2), round(y, 2)], "yaw_deg": 180, "width_m": 2.0,
          "rise_m": "deck - platform", "run_m": 10.5, "z_m": "platform", "stringer": frame}
-        for p in platforms
+        for y in middles
     ]  # fmt: skip
     draft.add({"node": "footbridge_stairs", "category": "stairs", "parts": stairs})
-    areas = [[x0, round(p.middle[1] - 1.4, 2), round(x1 + 11.0, 2), round(p.middle[1] + 1.4, 2)] for p in platforms]
+    areas = [Box(x0, y - 1.4, x1 + 11.0, y + 1.4).rounded() for y in middles]
     draft.make("keep_free", areas=areas, z=[0, "deck"])
     for k in range(int((high - low) // 5.0)):
         draft.slot("bridge", x, low + 2.5 + 5.0 * k, 0.0, (1.4, 2.6), on="deck")
 
 
-def _landmarks(draft: Draft, boxes: Sequence[Box]) -> None:
-    draft.section("Landmarks")
-    spots = [p for box in boxes for p in grid(box.grown(-2.8), 5.0)]
-    draft.landmark([(*p, draft.pick(SIDES, "landmark", *p)) for p in draft.shuffled(spots, "spots")])
-
-
-def _town(draft: Draft, box: Box, n: int, facing: float, ys: Sequence[float]) -> None:
-    """Put up buildings on a strip, the station in the middle, a square about it."""
+def _town(draft: Draft, box: Box, n: int, toward: float) -> None:
+    """Put up buildings on a strip, the station in the middle, fronts to the tracks in turn, a square about it."""
     draft.section("Buildings beside the line")
     draft.paint(box.rounded(), draft.material("square", n), rise_m=0.12)
     deep, x, k = min(box.depth - 4.5, 11.0), box.x0 + draft.number(2, 8, "first", n), 0
-    toward = 270.0 if min(ys) < box.middle[1] else 90.0
     while x + 10.0 < box.x1:
         long = draft.number(12, 24, "long", n, k)
         y0 = box.middle[1] - deep / 2
         house = Box(x, y0, min(x + long, box.x1 - 1), y0 + deep)
         if draft.is_free(house.shape()) and house.width > 8.0:
             storeys = max(1, round(draft.knob("storeys")) - draft.whole(0, 1, "lower", n, k))
-            name = f"building_{n}_{k}"
-            block_building(draft, house, name, storeys=storeys, street_deg=toward if k % 2 else (toward + 180) % 360,
-                           category="station_building" if k == 1 else "town_house")  # fmt: skip
+            street, category = toward + 180.0 * (k % 2 == 0), "station_building" if k == 1 else "town_house"
+            block_building(draft, house, f"building_{n}_{k}", storeys=storeys, street_deg=street, category=category)
         else:
             long = 3.0
         x, k = x + long + draft.number(4, 12, "gap", n, k), k + 1
-    for x, y in grid(box.grown(-1.4), 5.0):
-        if draft.is_free(shapely.Point(x, y).buffer(1.7)):
-            draft.slot("square", x, y, draft.pick(SIDES, "square", x, y), (3.4, 3.4))
+    draft.slots_over("square", box.grown(-1.4), 5.0, (3.4, 3.4), free_m=1.7)
 
 
 def _yard(draft: Draft, box: Box, n: int) -> None:
@@ -215,11 +207,8 @@ def _yard(draft: Draft, box: Box, n: int) -> None:
                        wall=draft.material("hall", n), roof=draft.material("hall_roof", n),
                        doors=draft.material("frame"), facing_deg=facing, **{"as": f"hall_{n}"})  # fmt: skip
             draft.take(hall.grown(0.5).shape())
-            for x, y in grid(hall.grown(-1.8), 5.0):
-                draft.slot("roof", x, y, facing, (4.4, 4.4), on=f"hall_{n}")
-    for x, y in grid(box.grown(-2.0), 5.6):
-        if draft.is_free(shapely.Point(x, y).buffer(2.4)):
-            draft.slot("yard", x, y, draft.pick(SIDES, "goods", x, y), (8.4, 4.6))
+            draft.slots_over("roof", hall.grown(-1.8), 5.0, (4.4, 4.4), yaw_deg=facing, on=f"hall_{n}")
+    draft.slots_over("yard", box.grown(-2.0), 5.6, (8.4, 4.6), "goods", free_m=2.4)
 
 
 def _green(draft: Draft, box: Box, n: int) -> None:
@@ -227,7 +216,7 @@ def _green(draft: Draft, box: Box, n: int) -> None:
     if box.depth < 3.0:
         return
     draft.paint(box.rounded(), draft.material("green", n))
-    for x, y in grid(box.grown(-1.4), 6.2):
+    for x, y in box.grown(-1.4).grid(6.2):
         u, v = x + draft.number(-1.5, 1.5, "u", x, y), y + draft.number(-1, 1, "v", x, y)
         kind = "tree" if draft.chance(0.4, "tree", x, y) else "green"
         draft.slot(kind, u, v, draft.number(0, 360, "green", x, y), (3.8, 3.8))
@@ -288,6 +277,6 @@ def _crossing_line(draft: Draft, d: float) -> Layout:
     return _rest(draft, bands, d, "green", "green"), draft.number(28, 36, "crossing"), draft.number(-16, 4, "bridge")
 
 
-_TOPOLOGIES: dict[str, Callable[[Draft, float], Layout]] = {
+_TOPOLOGIES = {
     "halt": _halt, "station": _island, "goods": _goods, "terminus": _terminus, "town": _crossing_line,
 }  # fmt: skip

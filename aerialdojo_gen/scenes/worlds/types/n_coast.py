@@ -10,10 +10,9 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.scenes.worlds.draft import Draft
-from aerialdojo_gen.scenes.worlds.shores import Isle, ahead, build_village, islands, landing
-from aerialdojo_gen.scenes.worlds.wilds import point, smoothed, winding
-
-Point = tuple[float, float]
+from aerialdojo_gen.scenes.worlds.shapes import Point, ahead, heading, point, smoothed, towards
+from aerialdojo_gen.scenes.worlds.shores import Isle, build_village, islands, landing
+from aerialdojo_gen.scenes.worlds.wilds import winding
 
 
 class _Shore(NamedTuple):
@@ -33,8 +32,8 @@ class _Shore(NamedTuple):
 
     def yaw(self, deg: float) -> float:
         """Direction in the world of one where 0 is along the shore and 90 inland."""
-        x, y = self.at(1e3 * math.cos(math.radians(deg)), 1e3 * math.sin(math.radians(deg)))
-        return round(math.degrees(math.atan2(y, x)) % 360.0, 1)
+        far = self.at(1e3 * math.cos(math.radians(deg)), 1e3 * math.sin(math.radians(deg)))
+        return round(towards((0.0, 0.0), far) % 360.0, 1)
 
     @property
     def along(self) -> str:
@@ -45,12 +44,9 @@ class _Shore(NamedTuple):
 
 def write(draft: Draft) -> None:
     """Raise the land, and build a village on it."""
-    build_village(draft, _TOPOLOGIES[draft.topology](draft, _shore(draft)))
-
-
-def _shore(draft: Draft) -> _Shore:
-    quarter, w, d = draft.whole(0, 3, "quarter"), draft.width_m / 2, draft.depth_m / 2
-    return _Shore(quarter, draft.pick([1, -1], "flip"), *((d, w) if quarter % 2 else (w, d)))
+    quarter, (w, d) = draft.whole(0, 3, "quarter"), draft.half
+    shore = _Shore(quarter, draft.pick([1, -1], "flip"), *((d, w) if quarter % 2 else (w, d)))
+    build_village(draft, _TOPOLOGIES[draft.topology](draft, shore))
 
 
 def _beside(shore: _Shore, at: float, by_m: float) -> BaseGeometry:
@@ -79,8 +75,7 @@ def _raise(
     draft: Draft, parts: list[Any], land: BaseGeometry, heights: dict[str, str], total: str, share: float = 1.0
 ) -> None:  # fmt: skip
     """Raise land, with so much of the drawn relief."""
-    w, d = draft.width_m / 2, draft.depth_m / 2
-    site = land.intersection(shapely.box(-w, -d, w, d))
+    site = land.intersection(draft.site.shape())
     islands(draft, parts, site, round(draft.knob("relief_m") * share, 2), heights=heights, total=total)
 
 
@@ -102,14 +97,13 @@ def _beach(draft: Draft, shore: _Shore) -> Isle:
     for k in range(draft.whole(3, 5, "groynes")):
         u = (-0.8 + 0.4 * k) * shore.half_u + draft.number(-3, 3, "groyne", k)
         if abs(u - middle) > 14.0:
-            sea = landing(land, shore.at(u, shore.half_v - 1.0), shore.yaw(270.0))
-            ends = ahead(sea, shore.yaw(90.0), 4.5), ahead(sea, shore.yaw(270.0), 9.0)
+            ends = _behind(shore, land, u, 4.5), _behind(shore, land, u, -9.0)
             lines.append([list(p) for p in ends])
             draft.take(shapely.LineString(ends).buffer(1.2))
     if lines:
         draft.make("groynes", lines=lines, height_m=1.5)
-    return Isle(land, _behind(shore, land, middle, 17.0), shore.yaw(270.0),
-                [_behind(shore, land, side * 0.68 * shore.half_u, 14.0) for side in (-1, 1)])  # fmt: skip
+    heads = [_behind(shore, land, side * 0.68 * shore.half_u, 14.0) for side in (-1, 1)]
+    return Isle(land, _behind(shore, land, middle, 17.0), shore.yaw(270.0), heads)
 
 
 def _cove(draft: Draft, shore: _Shore) -> Isle:
@@ -120,8 +114,7 @@ def _cove(draft: Draft, shore: _Shore) -> Isle:
     heads = [_behind(shore, land, at + side * half * 2.0, 13.0) for side in (-1, 1)]
     heights = {}
     for k, (x, y) in enumerate(heads):
-        far = f"hypot(x - {x}, y - {y})/{draft.number(15, 20, 'head', k)}"
-        heights[f"far_{k}"] = far
+        heights[f"far_{k}"] = f"hypot(x - {x}, y - {y})/{draft.number(15, 20, 'head', k)}"
         heights[f"head_{k}"] = f"{draft.number(5, 10, 'high', k)}*exp(-far_{k}*far_{k})*eased(inland, 1, 6)"
     _raise(draft, [{"polygon": ["coast"]}], land, heights, "head_0 + head_1")
     steep = shapely.MultiPoint(heads).buffer(24.0)
@@ -163,11 +156,10 @@ def _estuary(draft: Draft, shore: _Shore) -> Isle:
     whole = land.difference(river.buffer(width / 2))
     side = draft.pick([-1, 1], "side")
     _raise(draft, [{"polygon": ["coast_line"], "minus": {"ribbon": "river", "width_m": width}}], whole, {}, "0")
-    middle = river.interpolate(river.length * draft.number(0.5, 0.62, "bridge"))
-    beyond = river.interpolate(river.project(middle) + 0.5)
-    across = math.degrees(math.atan2(beyond.y - middle.y, beyond.x - middle.x)) + 90.0
+    *middle, along = heading(river, river.length * draft.number(0.5, 0.62, "bridge"))
+    across = along + 90.0
     draft.section("The bridge")
-    start = ahead((middle.x, middle.y), across, -(width / 2 + 3.5))
+    start = ahead((middle[0], middle[1]), across, -(width / 2 + 3.5))
     draft.make("pier", at=list(start), yaw_deg=round(across, 1), length_m=round(width + 7.0, 1), width_m=3.0, z=1.7,
                bay_m=4.2, rail=draft.material("rail"), category="footbridge")  # fmt: skip
     draft.take(shapely.LineString([start, ahead(start, across, width + 7.0)]).buffer(4.0))
@@ -192,12 +184,8 @@ def _spit(draft: Draft, shore: _Shore) -> Isle:
     parts = [{"polygon": ["coast"]}, {"ribbon": "hook", "width_m": wide, "round_ends": True},
              {"blob": [*end, 11.0, draft.whole(0, 999, "end"), 0.12]}]  # fmt: skip
     _raise(draft, parts, whole, {}, "0", 0.5)
-    return Isle(
-        whole,
-        _behind(shore, land, 0.25 * shore.half_u, 14.0),
-        shore.yaw(270.0),
-        [end, _behind(shore, land, 0.8 * shore.half_u, 12.0)],
-    )
+    village, head = _behind(shore, land, 0.25 * shore.half_u, 14.0), _behind(shore, land, 0.8 * shore.half_u, 12.0)
+    return Isle(whole, village, shore.yaw(270.0), [end, head])
 
 
 def _fjord(draft: Draft, shore: _Shore) -> Isle:
@@ -214,6 +202,6 @@ def _fjord(draft: Draft, shore: _Shore) -> Isle:
     return Isle(land, village, shore.yaw(270.0), heads, cliffs=_beside(shore, at, half * 1.1 + 6.0))
 
 
-_TOPOLOGIES: dict[str, Callable[[Draft, _Shore], Isle]] = {
+_TOPOLOGIES = {
     "beach": _beach, "cove": _cove, "cliffs": _cliffs, "estuary": _estuary, "spit": _spit, "fjord": _fjord,
 }  # fmt: skip

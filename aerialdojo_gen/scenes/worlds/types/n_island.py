@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import shapely
 
 from aerialdojo_gen.scenes.worlds.draft import Draft, NoRoomError
-from aerialdojo_gen.scenes.worlds.shores import Isle, ahead, build_village, coast, inside, islands, landing, towards
-from aerialdojo_gen.scenes.worlds.wilds import about, anywhere, smoothed, step, winding
-
-Point = tuple[float, float]
+from aerialdojo_gen.scenes.worlds.shapes import SIDES, Point, ahead, point, smoothed, towards
+from aerialdojo_gen.scenes.worlds.shores import Isle, build_village, coast, inside, islands, landing
+from aerialdojo_gen.scenes.worlds.wilds import about, anywhere, winding
 
 
 def write(draft: Draft) -> None:
     """Raise the island, and build a village on it."""
-    build_village(draft, _TOPOLOGIES[draft.topology](draft, draft.width_m / 2, draft.depth_m / 2))
+    build_village(draft, _TOPOLOGIES[draft.topology](draft, *draft.half))
 
 
 def _off_shore(draft: Draft, bay_deg: float) -> Point:
@@ -60,10 +58,8 @@ def _volcano(draft: Draft, w: float, d: float) -> Isle:
 def _atoll(draft: Draft, w: float, d: float) -> Isle:
     """A ring of low land, open at one side, about a lagoon; the village looks on the lagoon."""
     open_deg, turn = draft.number(0, 360, "open"), draft.number(95, 115, "turn")
-    ends = range(0, 101, 10)
-    arc = [(w * 0.66 * math.cos(math.radians(a)), d * 0.66 * math.sin(math.radians(a)))
-           for a in (open_deg + 180 - turn * 1.4 + turn * 2.8 * k / 100 for k in ends)]  # fmt: skip
-    arc = [(round(x, 1), round(y, 1)) for x, y in arc]
+    turns = [math.radians(open_deg + 180 - turn * 1.4 + turn * 2.8 * k / 100) for k in range(0, 101, 10)]
+    arc = [point(w * 0.66 * math.cos(a), d * 0.66 * math.sin(a)) for a in turns]
     draft.lines["reef"] = {"points": [list(p) for p in arc], "smooth": 1}
     width = draft.number(17, 21, "reef")
     parts, land = [{"ribbon": "reef", "width_m": width, "round_ends": True}], smoothed(arc, 1).buffer(width / 2)
@@ -107,7 +103,7 @@ def _twins(draft: Draft, w: float, d: float) -> Isle:
             heights=knolls, total="one + two")  # fmt: skip
     yaw = towards(one, two)
     start, end = landing(lands[0], one, yaw), landing(lands[1], two, yaw + 180)
-    span = math.hypot(end[0] - start[0], end[1] - start[1])
+    span = math.dist(start, end)
     if not 5.0 < span < 45.0:
         raise NoRoomError("no room for the bridge")
     draft.section("The bridge")
@@ -120,7 +116,7 @@ def _twins(draft: Draft, w: float, d: float) -> Isle:
 
 def _skerries(draft: Draft, w: float, d: float) -> Isle:
     """An islet with a deep inlet and two knolls, skerries about it."""
-    bay = draft.pick([0.0, 90.0, 180.0, 270.0], "bay") + draft.number(-20, 20, "bay_off")
+    bay = draft.pick(SIDES, "bay") + draft.number(-20, 20, "bay_off")
     land = coast(draft, "coast", (0, 0), (w * 0.68, d * 0.7), [(bay, 0.62, 20)])
     parts: list[dict[str, object]] = [{"polygon": ["coast"]}]
     islets: list[shapely.Point] = []
@@ -135,11 +131,12 @@ def _skerries(draft: Draft, w: float, d: float) -> Isle:
     for spot in islets:
         land = land.union(spot.buffer(4.0))
     knolls: dict[str, str] = {}
-    heads = [inside(main, ahead((0, 0), bay + 180, 12), bay + off, 15.0) for off in (125.0, -115.0)]
+    middle = ahead((0, 0), bay + 180, 12)
+    heads = [inside(main, middle, bay + off, 15.0) for off in (125.0, -115.0)]
     for k, head in enumerate(heads):
         knolls |= _knoll(f"knoll_{k}", head, draft.number(10, 13, "r", k), draft.number(3.5, 8, "h", k))
     islands(draft, parts, land, draft.knob("relief_m"), heights=knolls, total="knoll_0 + knoll_1")
-    return Isle(land, inside(main, ahead((0, 0), bay + 180, 12), bay, 15.0), bay, heads)
+    return Isle(land, inside(main, middle, bay, 15.0), bay, heads)
 
 
 def _fort(draft: Draft, w: float, d: float) -> Isle:
@@ -151,7 +148,7 @@ def _fort(draft: Draft, w: float, d: float) -> Isle:
     islands(draft, [{"polygon": ["coast"]}], land, draft.knob("relief_m"), total="table",
             heights={"away": f"hypot(x - {at[0]}, y - {at[1]}) + 2*noise",
                      "table": f"{height}*(1 - eased(away, 15, 21))"})  # fmt: skip
-    step(draft, "level_area", area={"disc": [*at, 11.5]}, blend_m=3)
+    draft.step("level_area", area={"disc": [*at, 11.5]}, blend_m=3)
     draft.paint({"blob": [*at, 12.5, draft.whole(0, 999, "court"), 0.12]}, draft.material("rock"))
     draft.section("The fort")
     high = [draft.number(1.6, 4.5, "wall", k) for k in range(5)]
@@ -165,6 +162,6 @@ def _fort(draft: Draft, w: float, d: float) -> Isle:
     return Isle(land, village, bay, heads, shapely.Point(at).buffer(21.0))
 
 
-_TOPOLOGIES: dict[str, Callable[[Draft, float, float], Isle]] = {
+_TOPOLOGIES = {
     "volcano": _volcano, "atoll": _atoll, "ridge": _ridge, "twins": _twins, "skerries": _skerries, "fort": _fort,
 }  # fmt: skip

@@ -3,29 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import shapely
 from shapely.geometry.base import BaseGeometry
 
+from aerialdojo_gen.scenes.worlds import wilds
 from aerialdojo_gen.scenes.worlds.draft import Draft
-from aerialdojo_gen.scenes.worlds.wilds import (
-    about,
-    beside,
-    bridged,
-    brook,
-    landmarks,
-    lay_out,
-    paths,
-    point,
-    step,
-    strewn,
-    water,
-    winding,
-)
+from aerialdojo_gen.scenes.worlds.shapes import Point, ahead, point, towards
 
-Point = tuple[float, float]
 _SUMMITS = ["summit_cross", "mountain_chapel", "fire_tower", "radio_mast", "obelisk"]
 
 
@@ -54,53 +41,45 @@ class _Massif(NamedTuple):
 
 def write(draft: Draft) -> None:
     """Raise the mountains, then water, summits and the paths to them, places in the valleys, crags and woods."""
-    w, d = draft.width_m / 2, draft.depth_m / 2
-    massif = _TOPOLOGIES[draft.topology](draft, w, d, draft.knob("relief_m"))
+    massif = _TOPOLOGIES[draft.topology](draft, *draft.half, draft.knob("relief_m"))
     ridges = [{"line": [list(p) for p in c.line], "width_m": c.width_m, "hollow": c.hollow} for c in massif.crests]
-    step(
-        draft,
-        "massif",
-        ridges=ridges,
-        bench_m=draft.number(3.5, 5.5, "bench"),
-        rough_m=draft.number(1.4, 2.6, "rough"),
-    )
-    draft.head["placing"] = {"settle_m": 0.5, "margin_m": 0.4}
-    draft.level_things = True
+    bench, rough = draft.number(3.5, 5.5, "bench"), draft.number(1.4, 2.6, "rough")
+    draft.step("massif", ridges=ridges, bench_m=bench, rough_m=rough)
+    draft.settle()
     _summits(draft, massif)
     shut = shapely.union_all([crest.shape() for crest in massif.crests])
     _cover(draft, massif.tarn)
     landings = []
     if massif.bed is not None:
-        bed = brook(draft, "brook", massif.bed, 11.0)
-        landings = bridged(draft, bed, draft.number(0.4, 0.6, "bridge"))
+        bed = wilds.brook(draft, "brook", massif.bed, 11.0)
+        landings = wilds.bridged(draft, bed, draft.number(0.4, 0.6, "bridge"))
     _paths(draft, massif, landings)
     crag_area = shut.difference(shapely.union_all([shapely.Point(h).buffer(9.0) for h in massif.heads]))
     draft.take(shut)
-    spots = lay_out(draft)
-    step(draft, "level_under_things")
-    landmarks(draft, spots)
+    spots = wilds.lay_out(draft)
+    draft.step("level_under_things")
+    wilds.landmarks(draft, spots)
     _crags(draft, crag_area)
-    strewn(draft, "slope", 34, (4.2, 4.2))
+    wilds.strewn(draft, "slope", 34, (4.2, 4.2))
     draft.fill_slots()
-    _growth(draft, w, d)
+    _growth(draft)
 
 
 def _summits(draft: Draft, massif: _Massif) -> None:
     """Level the summits, and put a landmark on the first that has room for one."""
     draft.section("The summits")
     for head in massif.heads:
-        step(draft, "level_area", area={"disc": [*head, 5.0]}, blend_m=3.5)
+        draft.step("level_area", area={"disc": [*head, 5.0]}, blend_m=3.5)
         draft.paint({"blob": [*head, 5.4, draft.whole(0, 999, "head", *head), 0.25]}, draft.material("glade"))
     draft.landmark([(*head, draft.number(0, 360, "head", *head, "yaw")) for head in massif.heads[:1]], of=_SUMMITS)
     for head in massif.heads:
-        about(draft, "summit", head, (3.4, 4.8), 5, (2.8, 2.8))
+        wilds.about(draft, "summit", head, (3.4, 4.8), 5, (2.8, 2.8))
 
 
 def _cover(draft: Draft, tarn: tuple[float, float, float] | None) -> None:
     """Paint meadows, snow where it is high and gentle, scree and rock where it is steep; fill the tarn."""
     draft.section("What covers the ground")
-    patches = [draft.material("patch", k) for k in range(3)]
-    draft.make("paint_patches", materials=patches, count=40, radius_m=[2.5, 7.5], seed=draft.whole(0, 999, "patches"))
+    wilds.patches(draft, "patch", 3, 40, [2.5, 7.5], 999)
     draft.make("steep_ground", slope=0.8, **{"as": "faces"})
     draft.paint({"area": "faces", "grow_m": [1.1, 2]}, draft.material("scree"))
     draft.paint("faces", draft.material("rock"))
@@ -109,52 +88,51 @@ def _cover(draft: Draft, tarn: tuple[float, float, float] | None) -> None:
         draft.paint({"area": "snowfields", "plus": {"disc": [0, 0, 0.1]}}, draft.material("snow"))
     if tarn is not None:
         x, y, radius = tarn
-        step(draft, "level_area", area={"disc": [x, y, radius + 4.0]}, blend_m=6)
-        step(draft, "sink_area", area={"disc": [x, y, radius + 1.0]}, depth_m=1.0, blend_m=2.5)
+        draft.step("level_area", area={"disc": [x, y, radius + 4.0]}, blend_m=6)
+        draft.step("sink_area", area={"disc": [x, y, radius + 1.0]}, depth_m=1.0, blend_m=2.5)
         draft.areas["water"] = {"blob": [x, y, round(radius - 1.0, 1), draft.whole(0, 999, "tarn"), 0.18]}
-        water(draft)
-        about(draft, "shore", (x, y), (radius + 2.4, radius + 4.0), 9, (4.8, 3.6))
-        draft.take(shapely.Point(x, y).buffer(radius + 5.0))
+        wilds.water(draft)
+        wilds.about(draft, "shore", (x, y), (radius + 2.4, radius + 4.0), 9, (4.8, 3.6))
+        draft.take_disc((x, y), radius + 5.0)
 
 
 def _paths(draft: Draft, massif: _Massif, landings: Sequence[Point]) -> None:
     lines = {}
     for k, (gate, head) in enumerate(zip(massif.gates, massif.heads, strict=False)):
-        toward = math.degrees(math.atan2(gate[1] - head[1], gate[0] - head[0]))
-        lines[f"path_{k}"] = winding(draft, f"path_{k}", (gate, point(*beside((*head, toward), 5.5, 0.0))), 9.0, 5)
-    for k, landing in enumerate(landings):
-        out = min(massif.gates, key=lambda g: math.hypot(g[0] - landing[0], g[1] - landing[1])) if k else None
-        if out is not None:
-            lines["over"] = winding(draft, "over", (landing, out), 3.0, 2)
-    paths(draft, lines)
+        foot = point(*ahead(head, towards(head, gate), 5.5))
+        lines[f"path_{k}"] = wilds.winding(draft, f"path_{k}", (gate, foot), 9.0, 5)
+    for landing in landings[1:]:
+        gate = min(massif.gates, key=lambda g: math.dist(g, landing))
+        lines["over"] = wilds.winding(draft, "over", (landing, gate), 3.0, 2)
+    wilds.tread(draft, lines)
 
 
 def _crags(draft: Draft, area: BaseGeometry) -> None:
     """Pile crags on the flanks."""
     rng, (x0, y0, x1, y1) = draft.rng("crags"), area.bounds
-    w, d = draft.width_m / 2 - 5.0, draft.depth_m / 2 - 5.0
-    found: list[dict[str, Any]] = []
+    inner, ways = (
+        draft.site.grown(-5.0).shape(),
+        [shapely.LineString(line["points"]) for line in draft.lines.values()],
+    )
+    crags: list[dict[str, Any]] = []
     for k in range(160):
-        x, y = round(float(rng.uniform(x0, x1)), 1), round(float(rng.uniform(y0, y1)), 1)
-        spot = shapely.Point(x, y)
-        clear = all(math.hypot(x - c["at"][0], y - c["at"][1]) > 12.0 for c in found)
-        ways = any(shapely.LineString(line["points"]).distance(spot) < 7.0 for line in draft.lines.values())
-        if len(found) < 8 and abs(x) < w and abs(y) < d and clear and not ways and area.contains(spot):
+        at = point(rng.uniform(x0, x1), rng.uniform(y0, y1))
+        spot = shapely.Point(at)
+        clear = all(math.dist(at, c["at"]) > 12.0 for c in crags) and all(way.distance(spot) >= 7.0 for way in ways)
+        if len(crags) < 8 and clear and inner.contains(spot) and area.contains(spot):
             radius = draft.number(2.6, 4.2, "crag", k)
-            found.append(
-                {"at": [x, y], "radius_m": radius, "height_m": round(radius * draft.number(1.2, 1.9, "high", k), 1)}
-            )
-    if found:
+            high = round(radius * draft.number(1.2, 1.9, "high", k), 1)
+            crags.append({"at": list(at), "radius_m": radius, "height_m": high})
+    if crags:
         draft.section("Crags")
-        draft.make("crags", crags=found, materials=[draft.material("rock"), draft.material("dark")])
+        draft.make("crags", crags=crags, materials=[draft.material("rock"), draft.material("dark")])
 
 
-def _growth(draft: Draft, w: float, d: float) -> None:
+def _growth(draft: Draft) -> None:
     """Plant woods below the tree line, dwarf spruces and flowers above, boulders at the feet of rocks."""
     draft.section("Woods and boulders")
-    ground: dict[str, Any] = {"box": [-w + 1.5, -d + 1.5, w - 1.5, d - 1.5], "minus": ["faces"]}
-    if "water" in draft.areas:
-        ground["minus"] = ["faces", {"area": "water", "grow_m": 1.0}]
+    water = [{"area": "water", "grow_m": 1.0}] if "water" in draft.areas else []
+    ground = {"box": list(draft.site.grown(-1.5)), "minus": ["faces", *water]}
     line = round(draft.knob("relief_m") * 0.55, 1)
     below, most = f"max(0, min(1, ({line} - z)/3))", round(draft.knob("trees"))
     trees = draft.material("trees").split("+")
@@ -178,7 +156,7 @@ def _cirque(draft: Draft, w: float, d: float, high: float) -> _Massif:
         crest.append((*point(0.84 * w * math.cos(turn), 0.84 * d * math.sin(turn)), round(z, 1)))
     spur = [crest[2], (*point(crest[2][0] * 0.45, crest[2][1] * 0.45), round(high * 0.35, 1))]
     crests = [_Crest(crest, draft.number(30, 38, "width")), _Crest(spur, 18.0, 1.1)]
-    at = point(*beside((0.0, 0.0, open_deg + 180.0), 8.0, draft.number(-6, 6, "tarn")))
+    at = point(*ahead((0.0, 0.0), open_deg + 180.0, 8.0, draft.number(-6, 6, "tarn")))
     gates = [_edge(open_deg + off, w, d) for off in (-45.0, 45.0)]
     return _Massif(crests, [crest[5][:2], crest[1][:2]], gates, (*at, draft.number(6.5, 9.0, "tarn", "radius")))
 
@@ -193,20 +171,21 @@ def _edge(deg: float, w: float, d: float) -> Point:
 def _pass(draft: Draft, w: float, d: float, high: float) -> _Massif:
     """A ridge across the site, and a path over its saddle."""
     along = draft.number(0, 180, "along")
-    ends = [_edge(along, w, d), _edge(along + 180.0, w, d)]
+    (x0, y0), (x1, y1) = _edge(along, w, d), _edge(along + 180.0, w, d)
     saddle = draft.number(0.4, 0.6, "saddle")
     crest = []
+
+    def between(f: float) -> Point:
+        return x0 + f * (x1 - x0), y0 + f * (y1 - y0)
+
     for k in range(7):
         f = k / 6
         dip = 1.0 - 0.5 * max(0.0, 1.0 - abs(f - saddle) / 0.22)
-        x, y = ends[0][0] + f * (ends[1][0] - ends[0][0]), ends[0][1] + f * (ends[1][1] - ends[0][1])
-        x, y = beside((x, y, along), 0.0, draft.number(-8, 8, "crest", k))
-        crest.append((*point(x, y), round(high * dip + draft.number(-1.5, 1.5, "crest", k, "z"), 1)))
-    heads = [point(ends[0][0] + saddle * (ends[1][0] - ends[0][0]), ends[0][1] + saddle * (ends[1][1] - ends[0][1]))]
-    heads *= 2  # A path comes up from either side
-    return _Massif(
-        [_Crest(crest, draft.number(24, 30, "width"))], heads, [_edge(along + 90.0, w, d), _edge(along - 90.0, w, d)]
-    )
+        at = ahead(between(f), along, 0.0, draft.number(-8, 8, "crest", k))
+        crest.append((*point(*at), round(high * dip + draft.number(-1.5, 1.5, "crest", k, "z"), 1)))
+    heads = [point(*between(saddle))] * 2  # A path comes up from either side
+    gates = [_edge(along + 90.0, w, d), _edge(along - 90.0, w, d)]
+    return _Massif([_Crest(crest, draft.number(24, 30, "width"))], heads, gates)
 
 
 def _peaks(draft: Draft, w: float, d: float, high: float) -> _Massif:
@@ -214,10 +193,8 @@ def _peaks(draft: Draft, w: float, d: float, high: float) -> _Massif:
     first = draft.number(0, 120, "first")
     tops = []
     for k in range(3):
-        turn, away = (
-            math.radians(first + 120 * k + draft.number(-15, 15, "peak", k)),
-            draft.number(0.55, 0.66, "peak", k, "r"),
-        )
+        turn = math.radians(first + 120 * k + draft.number(-15, 15, "peak", k))
+        away = draft.number(0.55, 0.66, "peak", k, "r")
         z = high * (1.0 - 0.16 * k) + draft.number(-1, 1, "peak", k, "z")
         tops.append((*point(away * w * math.cos(turn), away * d * math.sin(turn)), round(z, 1)))
     crests = [_Crest([top], draft.number(24, 30, "width", k), 1.2) for k, top in enumerate(tops)]
@@ -252,10 +229,10 @@ def _horn(draft: Draft, w: float, d: float, high: float) -> _Massif:
     crests = [_Crest([(*at, round(top, 1))], draft.number(24, 28, "width"), 1.2)]
     for k in range(n):
         yaw, long = first + 360 / n * k + draft.number(-15, 15, "ridge", k), draft.number(26, 38, "ridge", k, "long")
-        end = point(*beside((*at, yaw), long, 0.0))
+        end = point(*ahead(at, yaw, long))
         crests.append(_Crest([(*at, round(top * 0.8, 1)), (*end, round(top * 0.25, 1))], 17.0, 1.1))
     between = first + 180 / n
-    tarn = point(*beside((*at, between), 33.0, 0.0))
+    tarn = point(*ahead(at, between, 33.0))
     fits = abs(tarn[0]) < w - 12 and abs(tarn[1]) < d - 12
     gates = [_edge(between + 180.0, w, d)]
     return _Massif(crests, [at], gates, (*tarn, draft.number(5.5, 7.5, "tarn", "radius")) if fits else None)
@@ -270,10 +247,10 @@ def _caldera(draft: Draft, w: float, d: float, high: float) -> _Massif:
         share = 0.68 + 0.01 * draft.whole(-4, 4, "ring", k)
         z = high * (0.6 + 0.2 * draft.number(0, 1, "ring", k, "z")) * (0.75 if k in (0, 9) else 1.0)
         ring.append((*point(share * w * math.cos(turn), share * d * math.sin(turn)), round(z, 1)))
-    lake = (*point(*beside((0.0, 0.0, gap), 2.0, 0.0)), draft.number(7.5, 10.0, "lake"))
+    lake = (*point(*ahead((0.0, 0.0), gap, 2.0)), draft.number(7.5, 10.0, "lake"))
     return _Massif([_Crest(ring, 19.0)], [ring[2][:2]], [_edge(gap, w, d)], lake)
 
 
-_TOPOLOGIES: dict[str, Callable[[Draft, float, float, float], _Massif]] = {
+_TOPOLOGIES = {
     "cirque": _cirque, "pass": _pass, "peaks": _peaks, "valley": _valley, "horn": _horn, "caldera": _caldera,
 }  # fmt: skip

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import shapely
 
-from aerialdojo_gen.scenes.worlds.blocks import SIDES, lane_streets
+from aerialdojo_gen.scenes.worlds.blocks import lane_streets
 from aerialdojo_gen.scenes.worlds.draft import Draft, NoRoomError
-from aerialdojo_gen.scenes.worlds.street_maps import pose_on
-from aerialdojo_gen.scenes.worlds.streets import Box, grid
-from aerialdojo_gen.scenes.worlds.wilds import Pose, beside, point, strewn
+from aerialdojo_gen.scenes.worlds.shapes import SIDES, Box, Point, Pose, ahead, beside, point, pose_on, towards
+from aerialdojo_gen.scenes.worlds.wilds import strewn
 
-Point = tuple[float, float]
 _STOREY_M, _PITCH_M = 3.2, 6.4  # Of flats and of their balconies
 _NAMES = "ABCDEFGHIJKL"
 
@@ -30,8 +28,7 @@ class _Estate(NamedTuple):
 
 def write(draft: Draft) -> None:
     """Lay streets and bays, put up flats, then lead paths from their fronts through the garden, and fill slots."""
-    w, d = draft.width_m / 2, draft.depth_m / 2
-    estate = _TOPOLOGIES[draft.topology](draft, w, d)
+    estate = _TOPOLOGIES[draft.topology](draft, *draft.half)
     draft.section("Streets and parking bays")
     lane_streets(draft, estate.lanes)
     for lane in estate.lanes:
@@ -48,8 +45,9 @@ def write(draft: Draft) -> None:
     draft.section("The garden")
     _paths(draft, [front for front in fronts if front is not None], middle)
     draft.section("Landmarks")
-    site = Box(-draft.width_m / 2, -draft.depth_m / 2, draft.width_m / 2, draft.depth_m / 2)
-    near = sorted(grid(site.grown(-6), 5.0), key=lambda p: math.dist(p, middle) + draft.number(0, 10, "near", *p))
+    near = sorted(
+        draft.site.grown(-6).grid(5.0), key=lambda p: math.dist(p, middle) + draft.number(0, 10, "near", *p)
+    )
     spots = [(*p, draft.pick(SIDES, "landmark", *p)) for p in near]
     for what in draft.shuffled(draft.kind.landmarks, "landmarks"):  # Else the narrowest would have all gaps
         draft.landmark(spots, of=[what])
@@ -58,7 +56,13 @@ def write(draft: Draft) -> None:
     draft.fill_slots()
     draft.section("Trees")
     trees, limit = draft.material("trees").split("+"), round(draft.knob("trees"))
-    pattern = {"of": trees, "scatter": site.grown(-2).rounded(), "spacing_m": 7, "limit": limit, "stream": "trees"}
+    pattern = {
+        "of": trees,
+        "scatter": draft.site.grown(-2).rounded(),
+        "spacing_m": 7,
+        "limit": limit,
+        "stream": "trees",
+    }
     draft.add({"pattern": pattern, "fit": "skip"})
 
 
@@ -66,22 +70,22 @@ def _bays(draft: Draft, at: Point, yaw: float, count: int) -> None:
     """Pave a row of parking bays, with cars in some; nothing where the ground is taken."""
     half = count * 1.3
     row = ((0.0, -half), (0.0, half), (-5.2, half), (-5.2, -half))
-    corners = [beside((*at, yaw), u, v) for u, v in row]
-    area = shapely.Polygon(corners)
+    area = shapely.Polygon([ahead(at, yaw, u, v) for u, v in row])
     if not draft.is_free(area.buffer(-0.1)):
         return
     draft.paint([round(v, 2) for v in area.bounds], draft.material("street"))
-    draft.make(
-        "parking_rows", rows=[[round(at[0], 2), round(at[1], 2), yaw, count]], occupancy=draft.knob("occupancy")
-    )
+    rows = [[round(at[0], 2), round(at[1], 2), yaw, count]]
+    draft.make("parking_rows", rows=rows, occupancy=draft.knob("occupancy"))
     draft.take(area)
 
 
 def _flats(draft: Draft, pose: Pose, long_m: float, k: int) -> Point | None:
     """Put up a block of flats, with things on its roof, balconies, before and behind it; gives its door's place."""
     deep = draft.number(9.5, 11.5, "deep", k)
-    corners = [beside(pose, u * deep / 2, v * long_m / 2) for u, v in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
-    if not draft.is_free(shapely.Polygon(corners).buffer(1.0)):
+    body = shapely.Polygon(
+        [beside(pose, u * deep / 2, v * long_m / 2) for u, v in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+    )
+    if not draft.is_free(body.buffer(1.0)):
         return None
     storeys, name = max(3, round(draft.knob("storeys")) - draft.whole(0, 2, "storeys", k)), f"block {_NAMES[k % 12]}"
     draft.make(
@@ -89,7 +93,7 @@ def _flats(draft: Draft, pose: Pose, long_m: float, k: int) -> Point | None:
         wall=draft.material("wall", k), band=draft.material("band", k), paving=draft.material("plaza"),
         **{"as": f"roof_{k}"},
     )  # fmt: skip
-    draft.take(shapely.Polygon(corners).buffer(0.5))
+    draft.take(body.buffer(0.5))
     for j in range(3):
         draft.slot("roof", *beside(pose, 0.0, (j - 1) * long_m * 0.3), pose[2], (4.6, 4.6), on=f"roof_{k}")
     bays = int((long_m - 2.0) // _PITCH_M)
@@ -118,14 +122,12 @@ def _paths(draft: Draft, fronts: Sequence[Point], middle: Point) -> None:
     for n, line in enumerate(lines):
         for k in range(int((line.length - radius) // 6.0)):
             x, y, yaw = pose_on(line, 3.0 + 6.0 * k, 1 if (k + n) % 2 else -1, 2.3)
-            if draft.is_free(shapely.Point(x, y).buffer(1.0)):
+            if draft.has_room(x, y, 1.0):
                 draft.slot("path", x, y, yaw, (2.0, 2.6))
     for line in lines:
         draft.take(line.buffer(1.5))
     for k in range(8):
-        turn = math.radians(45.0 * k)
-        x, y = middle[0] + (radius - 1.0) * math.cos(turn), middle[1] + (radius - 1.0) * math.sin(turn)
-        draft.slot("plaza", x, y, 45.0 * k + 180.0, (2.2, 2.8))
+        draft.slot("plaza", *ahead(middle, 45.0 * k, radius - 1.0), 45.0 * k + 180.0, (2.2, 2.8))
 
 
 def _courts(draft: Draft, middle: Point) -> None:
@@ -135,8 +137,7 @@ def _courts(draft: Draft, middle: Point) -> None:
             wide, deep = deep, wide
         spots = draft.shuffled([(8.0 * i, 7.0 * j) for i in range(-6, 7) for j in range(-6, 7)], kind)
         for x, y in sorted(spots, key=lambda p: math.hypot(*p) + draft.number(0, 22, kind, *p)):
-            x, y = point(middle[0] + x, middle[1] + y)
-            box = Box(x - wide / 2, y - deep / 2, x + wide / 2, y + deep / 2)
+            box = Box.about(*point(middle[0] + x, middle[1] + y), wide, deep)
             if draft.is_free(box.shape()):
                 _court(draft, kind, box)
                 draft.take(box.grown(0.4).shape())
@@ -146,24 +147,25 @@ def _courts(draft: Draft, middle: Point) -> None:
 def _court(draft: Draft, kind: str, box: Box) -> None:
     if kind == "beds":
         draft.paint(box.rounded(), draft.material("path"))
-        at = [[round(x, 2), round(y, 2)] for x, y in grid(box.grown(-1.2), 3.9)]
+        at = [[round(x, 2), round(y, 2)] for x, y in box.grown(-1.2).grid(3.9)]
         draft.make("vegetable_beds", at=at[::2], greens=["foliage:#4f7f38", "foliage:#a8b860", "foliage:#8a4a5a"])
         for x, y in at[1::2]:
             draft.slot("allotment", x, y, draft.pick(SIDES, "bed", x, y), (3.4, 3.4))
         return
     draft.paint(box.rounded(), draft.material(kind))
     if kind == "play":
-        for x, y in grid(box, 5.6):
+        for x, y in box.grid(5.6):
             draft.slot("play", x, y, draft.number(0, 360, "play", x, y), (5.6, 4.6))
         return
     x, y = box.middle
     ring = {"disc": [round(x, 2), round(y, 2), 1.8]}
     draft.make("outline_marks", areas=[box.grown(-0.6).rounded(), ring], width_m=0.1)
-    along = box.width > box.depth
-    for side in (-1, 1):
-        u = side * (max(box.width, box.depth) / 2 - 1.4)
-        yaw = (180.0 if side > 0 else 0.0) + (0.0 if along else 90.0)
-        draft.slot("hoop", x + (u if along else 0.0), y + (0.0 if along else u), yaw, (4.2, 7.6))
+    out = max(box.width, box.depth) / 2 - 1.4
+    for side, yaw in ((-1, 0.0), (1, 180.0)):
+        if box.upright:
+            draft.slot("hoop", x, y + side * out, yaw + 90.0, (4.2, 7.6))
+        else:
+            draft.slot("hoop", x + side * out, y, yaw, (4.2, 7.6))
 
 
 def _court_estate(draft: Draft, w: float, d: float) -> _Estate:
@@ -218,8 +220,8 @@ def _crescent(draft: Draft, w: float, d: float) -> _Estate:
     n = draft.whole(4, 5, "blocks")
     for k in range(n):
         turn = math.radians(18 + 144 / (n - 1) * k)
-        x, y = cx + radius * math.cos(turn), cy + radius * math.sin(turn)
-        flats.append(((*point(x, y), math.degrees(turn) + 180.0), draft.number(20, 25, "long", k)))
+        at = point(cx + radius * math.cos(turn), cy + radius * math.sin(turn))
+        flats.append(((*at, math.degrees(turn) + 180.0), draft.number(20, 25, "long", k)))
     bays = [((cx + 21.0 * k, -d + 15.0), 270.0, 6) for k in (-1, 0, 1)]
     return _Estate(flats, lanes, bays, point(cx, cy + 0.45 * radius))
 
@@ -231,12 +233,12 @@ def _towers(draft: Draft, w: float, d: float) -> _Estate:
     flats = []
     for k, (u, v) in enumerate(spots):
         at = point(u * w + draft.number(-3, 3, "x", k), v * d + draft.number(-2, 2, "y", k))
-        yaw = math.degrees(math.atan2(-at[1], -at[0])) + draft.number(-20, 20, "yaw", k)
+        yaw = towards(at, (0.0, 0.0)) + draft.number(-20, 20, "yaw", k)
         flats.append(((*at, yaw), draft.number(16, 20, "long", k)))
     bays = [((-0.5 * w + 22.0 * k, -d + 15.0), 270.0, 5) for k in range(3)]
     return _Estate(flats, lanes, bays, point(-0.1 * w, 0.08 * d))
 
 
-_TOPOLOGIES: dict[str, Callable[[Draft, float, float], _Estate]] = {
+_TOPOLOGIES = {
     "court": _court_estate, "rows": _rows, "comb": _comb, "crescent": _crescent, "towers": _towers,
 }  # fmt: skip

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
-import shapely
-
-from aerialdojo_gen.scenes.worlds.blocks import SIDES, dressed, split, strung
+from aerialdojo_gen.scenes.worlds.blocks import dressed, split, strung
 from aerialdojo_gen.scenes.worlds.draft import Draft
-from aerialdojo_gen.scenes.worlds.streets import Box, edge_slots, grid, street_along
+from aerialdojo_gen.scenes.worlds.shapes import SIDES, Box
+from aerialdojo_gen.scenes.worlds.streets import (
+    BAY_DEPTH_M,
+    BAY_M,
+    DOUBLE_ROW_M,
+    bay_islands,
+    edge_slots,
+    street_along,
+)
 
-_BAY_M, _DEPTH_M, _AISLE_M = 2.6, 5.2, 6.4
 _STORES = ["MARKET", "CINEMA", "GALERIA", "PRIMA", "HOME", "NOVA", "CENTRAL"]
 
 
@@ -27,9 +32,9 @@ class _Mall(NamedTuple):
 
 def write(draft: Draft) -> None:
     """Lay the street and the car parks, pave courts, then put up shops and stores, with what stands there."""
-    w, d, flip = draft.width_m / 2, draft.depth_m / 2, draft.pick([1, -1], "flip")
+    (w, d), flip = draft.half, draft.pick([1, -1], "flip")
     draft.section("The street")
-    half = street_along(draft, [(-w, -d + 5.6), (w, -d + 5.6)])
+    half = street_along(draft, -d + 5.6)
     mall = _TOPOLOGIES[draft.topology](draft, Box(-w + 3.0, -d + 5.6 + half + 1.2, w - 3.0, d - 3.0))
     mall = _with_gardens(draft, mall if flip > 0 else _mirrored(mall))
     draft.section("Car parks")
@@ -41,16 +46,15 @@ def write(draft: Draft) -> None:
     for box in [*(b for b, _ in mall.shops), *mall.stores]:
         draft.take(box.grown(0.3).shape())
     draft.section("Landmarks")
-    spots = [p for court in mall.courts for p in grid(court.grown(-2.8), 3.4)]
-    spots += [p for lot in mall.lots for p in grid(lot.grown(-2.6), 5.0)]
+    spots = [p for court in mall.courts for p in court.grown(-2.8).grid(3.4)]
+    spots += [p for lot in mall.lots for p in lot.grown(-2.6).grid(5.0)]
     draft.landmark([(*p, 270.0) for p in draft.shuffled(spots, "spots")])
     draft.section("Shops and stores")
     _shops(draft, mall)
     strung(draft, mall.lanes, [box for box, _ in mall.shops], 4.3)
     for court in mall.courts:
-        for x, y in grid(court.grown(-2.2), 4.2):
-            draft.slot("court", x, y, draft.pick(SIDES, "court", x, y), (3.8, 3.8))
-    edge_slots(draft, "tree", Box(-w, -d, w, d).grown(-2.0), 6.0, (3.0, 3.0))
+        draft.slots_over("court", court.grown(-2.2), 4.2, (3.8, 3.8))
+    edge_slots(draft, "tree", draft.site.grown(-2.0), 6.0, (3.0, 3.0))
     draft.fill_slots()
 
 
@@ -68,7 +72,7 @@ def _with_gardens(draft: Draft, mall: _Mall) -> _Mall:
     """Leave car parks two or three double rows deep; what is behind them is paved or planted for people."""
     lots, gardens = [], []
     for k, lot in enumerate(mall.lots):
-        deep = 5.4 + draft.whole(2, 3, "double rows", k) * (2 * _DEPTH_M + _AISLE_M)
+        deep = 5.4 + draft.whole(2, 3, "double rows", k) * DOUBLE_ROW_M
         if lot.depth < deep + 12.0:
             lots.append(lot)
             continue
@@ -86,15 +90,13 @@ def _shops(draft: Draft, mall: _Mall) -> None:
                    storeys=storeys, storey_m=4.6 if storeys == 1 else 3.8, on=0, category="shop_building",
                    **{"as": f"shop_{k}"})  # fmt: skip
         dressed(draft, box, f"shop_{k}", 1, sides, shops=0.72)
-        for x, y in grid(box.grown(-2.0), 5.0):
-            draft.slot("roof", x, y, draft.pick(SIDES, "roof", x, y), (4.4, 4.4), on=f"shop_{k}")
+        draft.slots_over("roof", box.grown(-2.0), 5.0, (4.4, 4.4), on=f"shop_{k}")
     for k, box in enumerate(mall.stores):
         draft.make(
             "anchor_store", node=f"{names[k].lower()}_store", box=box.rounded(), sign=names[k],
             height_m=draft.number(9.0, 12.5, "store", k), wall=draft.material("store", k), **{"as": f"store_{k}"},
         )  # fmt: skip
-        for x, y in grid(box.grown(-2.4), 5.6):
-            draft.slot("roof", x, y, draft.pick(SIDES, "store roof", x, y), (4.6, 4.6), on=f"store_{k}")
+        draft.slots_over("roof", box.grown(-2.4), 5.6, (4.6, 4.6), "store roof", on=f"store_{k}")
 
 
 def _car_park(draft: Draft, lot: Box, k: int) -> None:
@@ -105,22 +107,16 @@ def _car_park(draft: Draft, lot: Box, k: int) -> None:
         kerb = round(-draft.depth_m / 2 + 5.6 + 3.2, 2)
         draft.paint([gate - 3.2, kerb, gate + 3.2, round(lot.y0 + 0.1, 2)], draft.material("lot"))
         draft.make("arrows", at=[[gate - 1.5, lot.y0, 270.0], [gate + 1.5, lot.y0, 90.0]])
-    rows, y = [], lot.y0 + 3.4 + _DEPTH_M
-    count = int((lot.width - 12.0) // _BAY_M)
-    while y + _DEPTH_M < lot.y1 - 2.0 and count > 3:
-        x = round(lot.middle[0], 2)
+    x, y, rows = round(lot.middle[0], 2), lot.y0 + 3.4 + BAY_DEPTH_M, []
+    count = int((lot.width - 12.0) // BAY_M)
+    while y + BAY_DEPTH_M < lot.y1 - 2.0 and count > 3:
         rows += [[x, round(y, 2), 90.0, count], [x, round(y, 2), 270.0, count]]
-        for side in (-1, 1):
-            at = x + side * (count * _BAY_M / 2 + 1.6)
-            island = Box(at - 1.2, y - _DEPTH_M, at + 1.2, y + _DEPTH_M)
-            draft.paint(island.rounded(), draft.material("island"), rise_m=0.12)
-            draft.slot("tree", at, y + 2.6, 0.0, (2.0, 2.0))
-            draft.slot("island", at, y - 2.2, 90.0, (2.2, 4.0))
-        y += 2 * _DEPTH_M + _AISLE_M
+        bay_islands(draft, x, y, count, 2.2)
+        y += DOUBLE_ROW_M
     if rows:
         draft.make("parking_rows", rows=rows, occupancy=draft.knob("occupancy"), differ=0.06)
         for u, v, _, many in rows[::2]:
-            draft.take(shapely.box(u - many * _BAY_M / 2, v - _DEPTH_M, u + many * _BAY_M / 2, v + _DEPTH_M))
+            draft.take(Box.about(u, v, many * BAY_M, 2 * BAY_DEPTH_M).shape())
     edge_slots(draft, "verge", lot.grown(-1.4), 5.6, (3.0, 3.0))
 
 
@@ -155,23 +151,22 @@ def _promenade(draft: Draft, area: Box) -> _Mall:
     y1 = area.y1 - deep
     y0 = y1 - wide
     end = draft.number(24, 30, "store")
-    shops: list[tuple[Box, tuple[float, ...]]] = []
-    shops += [(b, (270.0,)) for b in _row(draft, area.x0, area.x1 - end - 8, y1, area.y1, "north")]
-    shops += [(b, (90.0, 270.0)) for b in _row(draft, area.x0, area.x1 - end - 8, y0 - deep, y0, "south")]
+    north = [(b, (270.0,)) for b in _row(draft, area.x0, area.x1 - end - 8, y1, area.y1, "north")]
+    south = [(b, (90.0, 270.0)) for b in _row(draft, area.x0, area.x1 - end - 8, y0 - deep, y0, "south")]
     store = Box(area.x1 - end, area.y1 - draft.number(22, 28, "store_deep"), area.x1, area.y1)
     walk, square = Box(area.x0, y0, area.x1 - end - 8, y1), Box(area.x1 - end - 8, y0 - deep, area.x1, store.y0)
-    return _Mall(shops, [store], [walk, square], [walk], [Box(area.x0, area.y0, area.x1, y0 - deep - 5.0)])
+    return _Mall([*north, *south], [store], [walk, square], [walk], [Box(area.x0, area.y0, area.x1, y0 - deep - 5.0)])
 
 
 def _lanes(draft: Draft, area: Box) -> _Mall:
     """Shops on blocks with lanes between them, like a small town, a square among them."""
     y0 = area.y0 + draft.number(0.3, 0.38, "lot") * area.depth
-    blocks, lanes = split(draft, Box(area.x0, y0, area.x1, area.y1), (6.0, 8.5), (13.0, 24.0))
+    blocks, lanes = split(draft, area._replace(y0=y0), (6.0, 8.5), (13.0, 24.0))
     near = sorted(blocks, key=lambda b: abs(b.middle[0]) * 0.5 + abs(b.middle[1] - (y0 + area.y1) / 2))
     large = max(near[2:], key=lambda b: b.width)
     shops = [(b, SIDES) for b in near[2:] if b is not large]
-    paved = [Box(area.x0, y0, area.x1, area.y1)]
-    return _Mall(shops, [large.grown(-0.5)], [*paved, *near[:2]], lanes, [Box(area.x0, area.y0, area.x1, y0 - 4.0)])
+    lot = area._replace(y1=y0 - 4.0)
+    return _Mall(shops, [large.grown(-0.5)], [area._replace(y0=y0), *near[:2]], lanes, [lot])
 
 
 def _court(draft: Draft, area: Box) -> _Mall:
@@ -183,10 +178,8 @@ def _court(draft: Draft, area: Box) -> _Mall:
     shops = [(b, (270.0,)) for b in _row(draft, x - half, x + half, y1, area.y1, "north")]
     shops.append((Box(x - half - deep, low, x - half, area.y1), (0.0,)))
     shops.append((Box(x + half, low, x + half + deep, area.y1), (180.0,)))
-    stores = []
-    for a, b in ((area.x0, x - half - deep - 0.1), (x + half + deep + 0.1, area.x1)):
-        if b - a > 17.0:
-            stores.append(Box(a, area.y1 - 22.0, b, area.y1))
+    ends = ((area.x0, x - half - deep - 0.1), (x + half + deep + 0.1, area.x1))
+    stores = [Box(a, area.y1 - 22.0, b, area.y1) for a, b in ends if b - a > 17.0]
     return _Mall(shops, stores, [court], [], [Box(area.x0, area.y0, area.x1, low - 5.0)])
 
 
@@ -196,14 +189,12 @@ def _islands(draft: Draft, area: Box) -> _Mall:
     y1 = area.y1 - deep
     shops = [(b, (270.0,)) for b in _row(draft, area.x0, area.x1, y1, area.y1, "north")]
     y = (area.y0 + y1) / 2
-    stores, n = [], 2
-    for k in range(n):
-        x = area.x0 + (k + 0.5) * area.width / n + draft.number(-5, 5, "x", k)
-        stores.append(Box(x - 14.0, y - 3.0, x + 14.0, y + 14.0))
+    xs = [area.x0 + (k + 0.5) * area.width / 2 + draft.number(-5, 5, "x", k) for k in range(2)]
+    stores = [Box(x - 14.0, y - 3.0, x + 14.0, y + 14.0) for x in xs]
     walk = Box(area.x0, y1 - 6.0, area.x1, y1)
     return _Mall(shops, stores, [walk], [], [Box(area.x0, area.y0, area.x1, y - 12.0)])
 
 
-_TOPOLOGIES: dict[str, Callable[[Draft, Box], _Mall]] = {
+_TOPOLOGIES = {
     "strip": _strip, "promenade": _promenade, "lanes": _lanes, "court": _court, "islands": _islands,
 }  # fmt: skip

@@ -4,24 +4,33 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable
+from itertools import product
 from typing import Any
 
 import shapely
 
 from aerialdojo_gen.scenes.worlds.draft import Draft, NoRoomError
-from aerialdojo_gen.scenes.worlds.street_maps import HALF_M, Plot, Point, Way, kerb_slots, plot, streets
-from aerialdojo_gen.scenes.worlds.streets import Box, block_building, edge_slots, grid
+from aerialdojo_gen.scenes.worlds.shapes import SIDES, Box, Point, Pose, ahead, towards
+from aerialdojo_gen.scenes.worlds.streets import (
+    HALF_M,
+    Plot,
+    Way,
+    block_building,
+    edge_slots,
+    kerb_slots,
+    plot,
+    streets,
+)
 from aerialdojo_gen.scenes.worlds.wilds import strewn, winding
 
 _MIN_HOUSES = 4
 _FENCES = ["picket", "hedge", "wall", "railing"]
-Layout = tuple[list[Way], list[tuple[float, float, float]]]
+Layout = tuple[list[Way], list[Pose]]
 
 
 def write(draft: Draft) -> None:
     """Lay the streets, set landmarks at them, then plots along them, and fill what is left with green."""
-    w, d = draft.width_m / 2, draft.depth_m / 2
+    w, d = draft.half
     draft.section("The streets")
     ways, spots = _TOPOLOGIES[draft.topology](draft, w, d)
     draft.section("Landmarks")
@@ -32,15 +41,14 @@ def write(draft: Draft) -> None:
     kerb_slots(draft, ways, drives)
     draft.section("Allotments, and trees about the site")
     _allotments(draft, w, d)
-    edge_slots(draft, "tree", Box(-w, -d, w, d).grown(-2.2), 5.5, (3.5, 3.5))
+    edge_slots(draft, "tree", draft.site.grown(-2.2), 5.5, (3.5, 3.5))
     strewn(draft, "verge", 26, (4.2, 4.2), 3.0)
     draft.fill_slots()
 
 
 def _houses(draft: Draft, ways: list[Way]) -> list[shapely.Polygon]:
     """Line streets with houses, each called by its colour; gives the drives and paths that lead to them."""
-    roles = [role for role in draft.palette.materials if role.startswith("house_")]
-    colours = draft.shuffled(roles, "colours")
+    colours = _colours(draft, "colours")
     used: Counter[tuple[str, str]] = Counter()
     lots: list[dict[str, Any]] = []
     drives: list[shapely.Polygon] = []
@@ -52,18 +60,17 @@ def _houses(draft: Draft, ways: list[Way]) -> list[shapely.Polygon]:
                 style = _style(draft, colours[len(lots)], key)
                 front, back = draft.number(4.2, 6.4, "front", *key), draft.number(6.5, 9.0, "back", *key)
                 wide = style["width_m"] + (7.6 if style["garage"] else draft.number(4.4, 7.0, "wide", *key))
-                found = None
                 for behind in (back, 5.0):
                     depth = front + style["depth_m"] + behind + 0.4
-                    found = found or plot(draft, way, at + wide / 2, side, (wide, depth))
-                    back = behind if found and found.depth_m == depth else back
-                if found is None:
+                    if (ground := plot(draft, way, at + wide / 2, side, (wide, depth))) is not None:
+                        break
+                else:
                     at += 1.0
                     continue
-                lots.append(_lot(draft, found, colours[len(lots)], style, (front, back), used))
-                drives.append(found.strip(0.0, 0.9, 3.0))
+                lots.append(_lot(draft, ground, colours[len(lots)], style, (front, behind), used))
+                drives.append(ground.strip(0.0, 0.9, 3.0))
                 if style["garage"]:
-                    drives.append(found.strip(style["garage"] * (style["width_m"] / 2 + 1.8), 2.3, 3.0))
+                    drives.append(ground.strip(style["garage"] * (style["width_m"] / 2 + 1.8), 2.3, 3.0))
                 at += wide + draft.number(0.3, 1.5, "gap", *key)
     if len(lots) < (2 if draft.topology == "terraces" else _MIN_HOUSES):
         raise NoRoomError("room for few houses")
@@ -73,20 +80,23 @@ def _houses(draft: Draft, ways: list[Way]) -> list[shapely.Polygon]:
 
 def _allotments(draft: Draft, w: float, d: float) -> None:
     """Dig vegetable beds where the corners of the site are free."""
-    size_x, size_y = 15.0, 13.0
-    for x, y in ((x, y) for x in (-1, 1) for y in (-1, 1)):
-        u, v = x * (w - 5.0 - size_x / 2), y * (d - 5.0 - size_y / 2)
-        box = Box(u - size_x / 2, v - size_y / 2, u + size_x / 2, v + size_y / 2)
+    for x, y in product((-1, 1), repeat=2):
+        box = Box.about(x * (w - 12.5), y * (d - 11.5), 15.0, 13.0)
         if not draft.is_free(box.shape()):
             continue
         draft.paint(box.rounded(), draft.material("path"))
-        beds = [[round(bx, 2), round(by, 2)] for bx, by in grid(box.grown(-1.5), 3.9)]
+        beds = [[round(bx, 2), round(by, 2)] for bx, by in box.grown(-1.5).grid(3.9)]
         chosen = draft.shuffled(beds, "beds", x, y)
         greens = draft.shuffled(["#4f7f38", "#7f9a44", "#a8b860", "#3f6f44", "#8a4a5a"], "greens", x, y)[:3]
         draft.make("vegetable_beds", at=sorted(chosen[:5]), greens=[f"foliage:{one}" for one in greens])
         for bx, by in chosen[5:]:
-            draft.slot("allotment", bx, by, draft.pick([0.0, 90.0, 180.0, 270.0], "allotment", bx, by), (3.6, 3.6))
+            draft.slot("allotment", bx, by, draft.pick(SIDES, "allotment", bx, by), (3.6, 3.6))
         draft.take(box.shape())
+
+
+def _colours(draft: Draft, key: str) -> list[str]:
+    """Roles of the palette that houses are called by, in a drawn order."""
+    return draft.shuffled([role for role in draft.palette.materials if role.startswith("house_")], key)
 
 
 def _style(draft: Draft, role: str, key: tuple[object, ...]) -> dict[str, Any]:
@@ -105,15 +115,15 @@ def _style(draft: Draft, role: str, key: tuple[object, ...]) -> dict[str, Any]:
 
 
 def _lot(
-    draft: Draft, found: Plot, role: str, style: dict[str, Any], deep: tuple[float, float],
+    draft: Draft, ground: Plot, role: str, style: dict[str, Any], deep: tuple[float, float],
     used: Counter[tuple[str, str]],
 ) -> dict[str, Any]:  # fmt: skip
     front, back = deep
-    key = (found.x, found.y)
+    key = (ground.x, ground.y)
     lot: dict[str, Any] = {
         "colour": role.removeprefix("house_").replace("_", " "),
-        "at": list(found.at(front + style["depth_m"] / 2)), "yaw_deg": found.yaw_deg, "style": style,
-        "front_m": front, "back_m": back, "side_m": round(found.width_m / 2, 2),
+        "at": list(ground.at(front + style["depth_m"] / 2)), "yaw_deg": ground.yaw_deg, "style": style,
+        "front_m": front, "back_m": back, "side_m": round(ground.width_m / 2, 2),
         "front_fence": draft.pick(_FENCES, "front_fence", *key),
         "back_fence": draft.pick(["board", "board", "hedge"], "back_fence", *key),
         "back": _draw_categories(draft, "back garden", round(draft.knob("things")), key, used),
@@ -132,11 +142,7 @@ def _draw_categories(
     draft: Draft, kind: str, n: int, key: tuple[object, ...], used: Counter[tuple[str, str]]
 ) -> list[str]:
     """Draw different categories of a kind of slots, which a builder of the kit finds the places of."""
-    slots = draft.kind.slots[kind]
-    left = {
-        what: weight for what, weight in slots.of.items()
-        if used[kind, what] < slots.most and (what not in slots.held_out or draft.world.held_out)
-    }  # fmt: skip
+    left = draft.available(kind, used)
     drawn = sorted(left, key=lambda what: -math.log(draft.rng("deal", kind, *key, what).random()) / left[what])[:n]
     used.update((kind, what) for what in drawn)
     return drawn
@@ -149,27 +155,25 @@ def _mirrored(draft: Draft, *points: Point) -> list[Point]:
 
 
 def _straight(draft: Draft, paths: dict[str, list[Point]]) -> list[Way]:
-    return streets(
-        draft, {k: [list(p) for p in v] for k, v in paths.items()}, [shapely.LineString(v) for v in paths.values()]
-    )
+    lines = [[list(p) for p in path] for path in paths.values()]
+    return streets(draft, lines, [shapely.LineString(path) for path in paths.values()])
 
 
-def _green(draft: Draft, box: Box) -> list[tuple[float, float, float]]:
+def _green(draft: Draft, box: Box) -> list[Pose]:
     """Lay out a common green with crossing paths; gives where landmarks may stand on it."""
     x, y = box.middle
-    draft.take(shapely.box(*box.grown(-1.0)).difference(shapely.box(*box.grown(-2.0))))
+    draft.take(box.grown(-1.0).shape().difference(box.grown(-2.0).shape()))
     draft.paint(box.rounded(), draft.material("green"))
     lines = [[[box.x0, box.y0], [x, y], [box.x1, box.y1]], [[box.x0, box.y1], [x, y], [box.x1, box.y0]]]
     path = draft.material("path")
     draft.paint([{"ribbon": [[round(u, 2), round(v, 2)] for u, v in line], "width_m": 1.6} for line in lines], path)
     draft.paint({"disc": [round(x, 2), round(y, 2), 5.6]}, path)
     ways = [shapely.LineString(line).buffer(1.1) for line in lines]
-    for u, v in grid(box.grown(-2.5), 4.2):
+    for u, v in box.grown(-2.5).grid(4.2):
         spot = shapely.Point(u, v)
         if spot.distance(shapely.Point(x, y)) > 7.4 and not any(way.intersects(spot.buffer(1.5)) for way in ways):
-            yaw = math.degrees(math.atan2(y - v, x - u))
-            draft.slot("green", u, v, round(yaw / 90) * 90.0, (3.9, 3.9))
-    return [(round(x, 2), round(y, 2), draft.pick([0.0, 90.0, 180.0, 270.0], "green"))]
+            draft.slot("green", u, v, round(towards((u, v), (x, y)) / 90) * 90.0, (3.9, 3.9))
+    return [(round(x, 2), round(y, 2), draft.pick(SIDES, "green"))]
 
 
 def _culdesac(draft: Draft, w: float, d: float) -> Layout:
@@ -188,7 +192,7 @@ def _culdesac(draft: Draft, w: float, d: float) -> Layout:
     turns = [math.radians(start + k * 332.0 / 40) for k in range(41)]
     circle = shapely.LineString([(cx + radius * math.cos(t), cy + radius * math.sin(t)) for t in turns])
     for k, turn in enumerate(turns[3:-3:5]):
-        at = cx + (radius - 1.4) * math.cos(turn), cy + (radius - 1.4) * math.sin(turn)
+        at = ahead((cx, cy), math.degrees(turn), radius - 1.4)
         draft.slot("circle", *at, math.degrees(turn) + (90.0 if k % 2 else -90.0), (5.2, 2.3))
     return [Way(circle, 2.1, False), ways[1], ways[0]], [(cx, cy, 0.0)]
 
@@ -196,12 +200,13 @@ def _culdesac(draft: Draft, w: float, d: float) -> Layout:
 def _village(draft: Draft, w: float, d: float) -> Layout:
     half_x, half_y = draft.number(16.0, 19.0, "green_x"), draft.number(13.0, 15.0, "green_y")
     x = draft.number(-w / 3, w / 3, "link")
-    link = _mirrored(draft, (min(max(x, -half_x), half_x), half_y), (min(max(x, -half_x), half_x), d))
-    a, b = half_x, half_y
-    ring = [(-a, -b), (a, -b), (a, b), (-a, b), (-a, -b)]
+    x = min(max(x, -half_x), half_x)
+    link = _mirrored(draft, (x, half_y), (x, d))
+    green = Box(-half_x, -half_y, half_x, half_y)
+    ring = [(-half_x, -half_y), (half_x, -half_y), (half_x, half_y), (-half_x, half_y), (-half_x, -half_y)]
     ways = _straight(draft, {"ring": ring, "link": link})
     sides = [Way(shapely.LineString(ring[k : k + 2])) for k in range(4)]
-    return [*sides, ways[1]], _green(draft, Box(-a, -b, a, b).grown(-HALF_M - 0.3))
+    return [*sides, ways[1]], _green(draft, green.grown(-HALF_M - 0.3))
 
 
 def _crossroads(draft: Draft, w: float, d: float) -> Layout:
@@ -211,14 +216,14 @@ def _crossroads(draft: Draft, w: float, d: float) -> Layout:
     sx, sy = draft.pick([(1, 1), (-1, 1), (1, -1), (-1, -1)], "shop")
     x0, y0 = x + sx * (HALF_M + 3.0), y + sy * (HALF_M + 3.4)
     long, deep = draft.number(11, 15, "shop_long"), draft.number(9, 11, "shop_deep")
-    shop = Box(min(x0, x0 + sx * long), min(y0, y0 + sy * deep), max(x0, x0 + sx * long), max(y0, y0 + sy * deep))
+    shop = Box(*shapely.box(x0, y0, x0 + sx * long, y0 + sy * deep).bounds)
     draft.paint(shop.grown(2.9).rounded(), draft.material("pavement"), rise_m=0.12)
     storeys = draft.whole(1, 2, "shop_storeys")
     block_building(draft, shop, "shop", storeys=storeys, street_deg=270.0 if sy > 0 else 90.0, category="corner_shop")
     draft.take(shop.grown(2.9).shape())
-    u, v = x - sx * (HALF_M + 9.5), y - sy * (HALF_M + 9.0)
-    spots = _green(draft, Box(u - 9.0, v - 8.5, u + 9.0, v + 8.5))
-    draft.take(Box(u - 9.0, v - 8.5, u + 9.0, v + 8.5).shape().difference(shapely.Point(u, v).buffer(6.0)))
+    green = Box.about(x - sx * (HALF_M + 9.5), y - sy * (HALF_M + 9.0), 18.0, 17.0)
+    spots = _green(draft, green)
+    draft.take(green.shape().difference(shapely.Point(green.middle).buffer(6.0)))
     return ways, spots
 
 
@@ -228,8 +233,7 @@ def _crescent(draft: Draft, w: float, d: float) -> Layout:
     middle = line.interpolate(line.length * draft.number(0.4, 0.6, "link"))
     side = draft.pick([-1, 1], "side")
     link = [(round(middle.x, 1), round(middle.y, 1)), (round(middle.x + draft.number(-6, 6, "lean"), 1), side * d)]
-    ways = streets(draft, {"crescent": "crescent", "link": [list(p) for p in link]}, [line, shapely.LineString(link)])
-    return ways, []
+    return streets(draft, ["crescent", [list(p) for p in link]], [line, shapely.LineString(link)]), []
 
 
 def _terraces(draft: Draft, w: float, d: float) -> Layout:
@@ -253,7 +257,7 @@ def _terraces(draft: Draft, w: float, d: float) -> Layout:
 def _terrace(
     draft: Draft, at: Point, yaw: float, n: int, name: str, used: Counter[tuple[str, str]]
 ) -> None:  # fmt: skip
-    roles = draft.shuffled([role for role in draft.palette.materials if role.startswith("house_")], name)[:n]
+    roles = _colours(draft, name)[:n]
     roof, storeys = draft.material("roof", name), max(2, round(draft.knob("storeys")))
     houses = [
         {
@@ -279,18 +283,17 @@ def _courts(draft: Draft, w: float, d: float) -> Layout:
         path = [(round(x, 1), road + HALF_M), (round(x + draft.number(-3, 3, k), 1), d - 6.0)]
         draft.paint({"ribbon": [list(p) for p in path], "width_m": 2.4}, draft.material("path"))
         draft.paint({"disc": [*path[1], 5.2]}, draft.material("path"))
-        draft.take(shapely.LineString(path).buffer(1.5, cap_style="flat"))
         line = shapely.LineString(path)
+        draft.take(line.buffer(1.5, cap_style="flat"))
         for n in range(int(line.length // 5)):
-            p = line.interpolate(4.0 + 5.0 * n)
-            side = 1 if n % 2 else -1
+            p, side = line.interpolate(4.0 + 5.0 * n), 1 if n % 2 else -1
             draft.slot("walk", p.x + side * 2.2, p.y, 90.0 + side * 90.0, (1.3, 3.0))
         walks.append(Way(line, 3.2, False))
     spots = [(w / 2 * s, d - 6.0, 270.0) for s in (-1, 1)]
     return [*walks, *ways], spots
 
 
-_TOPOLOGIES: dict[str, Callable[[Draft, float, float], Layout]] = {
+_TOPOLOGIES = {
     "culdesac": _culdesac, "village": _village, "crossroads": _crossroads, "crescent": _crescent,
     "terraces": _terraces, "courts": _courts,
 }  # fmt: skip

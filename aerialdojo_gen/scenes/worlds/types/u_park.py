@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from itertools import pairwise
+from collections.abc import Iterator
+from itertools import pairwise, product
 from typing import Any, NamedTuple
 
 import shapely
 
 from aerialdojo_gen.scenes.worlds.draft import Draft, NoRoomError
-from aerialdojo_gen.scenes.worlds.streets import Box, edge_slots, grid, street_along
-from aerialdojo_gen.scenes.worlds.wilds import rolling, step, strewn
+from aerialdojo_gen.scenes.worlds.shapes import SIDES, Box, Point, ahead, heading
+from aerialdojo_gen.scenes.worlds.streets import edge_slots, street_along
+from aerialdojo_gen.scenes.worlds.wilds import rolling, strewn
 
-Point = tuple[float, float]
 _WORDS = [
     "DARTS", "RINGS", "PRIZES", "HOOPLA", "DUCKS", "CANS", "LUCKY", "POPCORN", "TEA", "NUTS", "MASKS", "TOYS",
     "CREPES", "JUICE", "FRIES", "TICKETS", "SWEETS", "HATS", "BALLS", "ARROWS", "WAFFLES", "CIDER", "FISH", "PIZZA",
@@ -45,10 +45,10 @@ class Pad(NamedTuple):
 
 def write(draft: Draft) -> None:
     """Lay street and gate, ways and plazas, put rides on these, booths and lights between, and trees about them."""
-    w, d = draft.width_m / 2, draft.depth_m / 2
+    w, d = draft.half
     inwards = draft.pick([1.0, -1.0], "inwards")
     draft.section("The street, the gate and the fence")
-    half = street_along(draft, [(-w, -inwards * (d - 6.0)), (w, -inwards * (d - 6.0))])
+    half = street_along(draft, -inwards * (d - 6.0))
     inner = -inwards * (d - 6.0 - half - 3.0)
     box = Box(-w + 2.0, min(inner, inwards * (d - 2.0)), w - 2.0, max(inner, inwards * (d - 2.0)))
     park = Park(box, (draft.number(-w / 5, w / 5, "gate"), round(inner, 2)), inwards)
@@ -58,7 +58,7 @@ def write(draft: Draft) -> None:
     for pad in pads:
         _ring(draft, pad)
     draft.section("Rides")
-    draft.landmark((pad.x, pad.y, draft.pick([0.0, 90.0, 180.0, 270.0], "ride", pad.x)) for pad in pads)
+    draft.landmark((pad.x, pad.y, draft.pick(SIDES, "ride", pad.x)) for pad in pads)
     if len(draft.landmarks) < 2:
         raise NoRoomError("no room for the rides")
     _halls(draft, [pad for pad in pads if draft.is_free(pad.shape().buffer(-5.5))])
@@ -73,10 +73,8 @@ def write(draft: Draft) -> None:
 def _gate(draft: Draft, park: Park) -> None:
     (x, y), box = park.gate, park.box
     width = draft.number(5.6, 7.0, "gate_width")
-    kerb = round(y - park.inwards * 3.2, 2)
-    draft.paint(
-        [x - 4.0, min(kerb, y + park.inwards * 4), x + 4.0, max(kerb, y + park.inwards * 4)], draft.material("path")
-    )
+    low, high = sorted((round(y - park.inwards * 3.2, 2), y + park.inwards * 4))
+    draft.paint([x - 4.0, low, x + 4.0, high], draft.material("path"))
     draft.make(
         "entrance_gate", at=[x, y], yaw_deg=-90.0 * park.inwards, name=draft.pick(_NAMES, "name"), width_m=width,
         wall=draft.material("wall"), roof=draft.material("roof"), sign=draft.material("paint", "sign"),
@@ -100,21 +98,26 @@ def _way(draft: Draft, points: list[Point], width_m: float = 3.2) -> None:
     draft.paint(ribbon, draft.material("path"))
     draft.take(line.buffer(width_m / 2))
     for k in range(int((line.length - 2.0) // 3.4)):
-        here, there = line.interpolate(2.0 + 3.4 * k), line.interpolate(2.5 + 3.4 * k)
-        yaw, side = math.atan2(there.y - here.y, there.x - here.x), 1 if k % 2 else -1
-        away = side * (width_m / 2 + 1.2)
-        x, y = here.x - math.sin(yaw) * away, here.y + math.cos(yaw) * away
-        if draft.is_free(shapely.Point(x, y).buffer(0.9)):
-            draft.slot("wayside", x, y, math.degrees(yaw) - side * 90.0, (1.9, 2.6))
+        (x, y, yaw), side = heading(line, 2.0 + 3.4 * k), 1 if k % 2 else -1
+        away, turn = side * (width_m / 2 + 1.2), math.radians(yaw)
+        x, y = x - math.sin(turn) * away, y + math.cos(turn) * away
+        if draft.has_room(x, y, 0.9):
+            draft.slot("wayside", x, y, yaw - side * 90.0, (1.9, 2.6))
+
+
+def _way_to(draft: Draft, start: Point, pad: Pad, from_m: float) -> None:
+    """Pave a way to a plaza, from a point, or so far from it."""
+    (x, y), away = start, math.dist(start, pad[:2])
+    f, g = from_m / away, 1.0 - 0.9 * pad.radius_m / away
+    _way(draft, [(x + t * (pad.x - x), y + t * (pad.y - y)) for t in (f, g)])
 
 
 def _pad(draft: Draft, x: float, y: float, radius_m: float) -> Pad:
     pad = Pad(round(x, 1), round(y, 1), round(radius_m, 1))
     draft.paint({"disc": [pad.x, pad.y, pad.radius_m, 32]}, draft.material("plaza", pad.x, pad.y))
     if draft.chance(0.6, "inlay", pad.x, pad.y):
-        draft.paint(
-            {"disc": [pad.x, pad.y, round(pad.radius_m * 0.55, 1), 28]}, draft.material("inlay", pad.x, pad.y)
-        )
+        inlay = {"disc": [pad.x, pad.y, round(pad.radius_m * 0.55, 1), 28]}
+        draft.paint(inlay, draft.material("inlay", pad.x, pad.y))
     return pad
 
 
@@ -125,7 +128,7 @@ def _ring(draft: Draft, pad: Pad) -> None:
     for k in range(n):
         turn = math.radians(first + k * 360.0 / n)
         x, y = pad.x + (pad.radius_m - 1.0) * math.cos(turn), pad.y + (pad.radius_m - 1.0) * math.sin(turn)
-        if draft.is_free(shapely.Point(x, y).buffer(1.0)):
+        if draft.has_room(x, y, 1.0):
             draft.slot("plaza", x, y, round(math.degrees(turn) + 180.0), (2.6, 2.6))
 
 
@@ -134,7 +137,7 @@ def _halls(draft: Draft, pads: list[Pad]) -> None:
     signs = draft.shuffled(_HALLS, "halls")
     for k, pad in enumerate(pads):
         if k >= 2:
-            draft.slot("pad", pad.x, pad.y, draft.pick([0.0, 90.0, 180.0, 270.0], "pad", pad.x), (9.5, 9.5))
+            draft.slot("pad", pad.x, pad.y, draft.pick(SIDES, "pad", pad.x), (9.5, 9.5))
             continue
         size = [draft.number(7.0, 9.5, "hall", k), draft.number(6.0, 8.5, "hall_deep", k)]
         draft.make(
@@ -143,9 +146,9 @@ def _halls(draft: Draft, pads: list[Pad]) -> None:
             trim=draft.material("trim"), floor=draft.material("inlay", "hall", k), **{"as": f"hall_{k}"},
         )  # fmt: skip
         half = min(size) / 2 - 1.6
-        draft.take(shapely.Point(pad.x, pad.y).buffer(max(size) / 2))
-        for u, v in ((-1, -1), (1, -1), (-1, 1), (1, 1)):
-            kind = "dodgem" if signs[k] in ("DODGEMS", "BUMPERS") else "indoors"
+        draft.take_disc((pad.x, pad.y), max(size) / 2)
+        kind = "dodgem" if signs[k] in ("DODGEMS", "BUMPERS") else "indoors"
+        for u, v in product((-1, 1), repeat=2):
             yaw = draft.number(0, 360, kind, k, u, v) if kind == "dodgem" else 90.0
             draft.slot(kind, pad.x + u * half * 0.8, pad.y + v * half * 0.8, yaw, (2.2, 2.2), on=f"hall_{k}")
 
@@ -154,7 +157,7 @@ def _booths(draft: Draft, x: float, y: float, yaw: float, most: int = 9) -> None
     """Put up a row of booths where the ground is free."""
     count = min(round(draft.knob("booths")), most)
     u, v = (1.7, count * 1.5 + 0.3) if yaw % 180 == 0 else (count * 1.5 + 0.3, 1.7)
-    area = shapely.box(x - u, y - v, x + u, y + v)
+    area = Box.about(x, y, 2 * u, 2 * v).shape()
     if not draft.is_free(area):
         return
     draft.take(area)
@@ -176,7 +179,7 @@ def _lights(draft: Draft, pads: list[Pad]) -> None:
         poles = [[round(a.x + t * (b.x - a.x), 1), round(a.y + t * (b.y - a.y), 1)] for t in (f, (f + g) / 2, g)]
         draft.make("festoons", node=f"lights_{k}", poles=poles)
         for x, y in poles:
-            draft.take(shapely.Point(x, y).buffer(0.4))
+            draft.take_disc((x, y), 0.4)
 
 
 def _midway(draft: Draft, park: Park) -> list[Pad]:
@@ -201,41 +204,39 @@ def _midway(draft: Draft, park: Park) -> list[Pad]:
     return pads
 
 
+def _on_ellipse(draft: Draft, box: Box, number: int, radius_m: Point) -> Iterator[tuple[float, float, float]]:
+    """Yield places for plazas about the middle of a box, and their radii."""
+    first = draft.number(0, 60, "first")
+    for k in range(number):
+        turn, size = math.radians(first + 360.0 / number * k), draft.number(*radius_m, "pad", k)
+        yield math.cos(turn) * (box.width / 2 - size - 1.5), math.sin(turn) * (box.depth / 2 - size - 1.5), size
+
+
 def _lake(draft: Draft, park: Park) -> list[Pad]:
     (gx, gy), box, s = park.gate, park.box, park.inwards
     x, y = box.middle
     radius = draft.number(11.0, 14.0, "lake")
-    step(draft, "level_grid", cell_m=1.2)
-    step(draft, "sink_area", area={"disc": [x, y, radius]}, depth_m=1.1, blend_m=2.0)
+    draft.step("level_grid", cell_m=1.2)
+    draft.step("sink_area", area={"disc": [x, y, radius]}, depth_m=1.1, blend_m=2.0)
     draft.areas["lake"] = {"blob": [x, y, radius - 0.6, draft.whole(0, 1999, "lake"), 0.16, 36]}
     draft.paint({"area": "lake", "grow_m": 1.1}, draft.material("bank"))
     draft.paint("lake", draft.material("water"))
-    draft.take(shapely.Point(x, y).buffer(radius + 0.8))
+    draft.take_disc((x, y), radius + 0.8)
     for k in range(5):
-        turn = math.radians(k * 72.0 + draft.number(-20, 20, "boat", k))
-        away = draft.number(2.0, radius - 5.0, "boat_away", k)
-        draft.slot(
-            "boats", x + away * math.cos(turn), y + away * math.sin(turn), draft.number(0, 360, "b", k), (5.8, 4.4)
-        )
-    pads, first = [], draft.number(0, 60, "first")
-    for k in range(6):
-        turn = math.radians(first + 60.0 * k)
-        size = draft.number(7.6, 9.0, "pad", k)
-        reach_x, reach_y = box.width / 2 - size - 1.5, box.depth / 2 - size - 1.5
-        pad = (x + math.cos(turn) * reach_x, y + math.sin(turn) * reach_y, size)
-        clear = shapely.Point(pad[:2]).distance(shapely.Point(gx, gy)) > size + 6.0
-        if clear and math.hypot(pad[0] - x, pad[1] - y) > radius + size + 4.5:
-            pads.append(_pad(draft, *pad))
+        turn, away = k * 72.0 + draft.number(-20, 20, "boat", k), draft.number(2.0, radius - 5.0, "boat_away", k)
+        draft.slot("boats", *ahead((x, y), turn, away), draft.number(0, 360, "b", k), (5.8, 4.4))
+    pads = []
+    for u, v, size in _on_ellipse(draft, box, 6, (7.6, 9.0)):
+        if math.dist((x + u, y + v), park.gate) > size + 6.0 and math.hypot(u, v) > radius + size + 4.5:
+            pads.append(_pad(draft, x + u, y + v, size))
     turns = [math.radians(10.0 * k) for k in range(37)]
     _way(draft, [(x + (radius + 3.0) * math.cos(t), y + (radius + 3.0) * math.sin(t)) for t in turns])
     for pad in pads:
-        away = math.hypot(pad.x - x, pad.y - y)
-        f, g = (radius + 3.0) / away, 1.0 - 0.9 * pad.radius_m / away
-        _way(draft, [(x + t * (pad.x - x), y + t * (pad.y - y)) for t in (f, g)])
+        _way_to(draft, (x, y), pad, radius + 3.0)
     _way(draft, [(gx, gy), (x, y - s * (radius + 3.0))], 4.4)
     for side in (-1, 1):
-        _booths(draft, gx + side * 15.0, gy + s * 4.2, 90.0 * s)
-        _booths(draft, gx + side * 26.0, gy + s * 4.2, 90.0 * s)
+        for away in (15.0, 26.0):
+            _booths(draft, gx + side * away, gy + s * 4.2, 90.0 * s)
         _booths(draft, side * (box.x1 - 3.0), y + side * 4.0, 90.0 + 90.0 * side)
     return pads
 
@@ -245,19 +246,11 @@ def _star(draft: Draft, park: Park) -> list[Pad]:
     x, y = box.middle
     middle = _pad(draft, x, y, draft.number(11.0, 13.0, "middle"))
     pads = [middle]
-    n, first = draft.whole(5, 6, "spokes"), draft.number(0, 60, "first")
-    ends: list[Point] = []
-    for k in range(n):
-        turn = math.radians(first + 360.0 / n * k)
-        size = draft.number(7.4, 8.8, "pad", k)
-        u, v = math.cos(turn) * (box.width / 2 - size - 1.5), math.sin(turn) * (box.depth / 2 - size - 1.5)
-        if math.hypot(u, v) > middle.radius_m + size + 3.0 and math.hypot(x + u - gx, y + v - gy) > size + 6.0:
+    for u, v, size in _on_ellipse(draft, box, draft.whole(5, 6, "spokes"), (7.4, 8.8)):
+        if math.dist((x + u, y + v), park.gate) > size + 6.0 and math.hypot(u, v) > middle.radius_m + size + 3.0:
             pads.append(_pad(draft, x + u, y + v, size))
-            ends.append((x + u, y + v))
     for pad in pads[1:]:
-        away = math.hypot(pad.x - x, pad.y - y)
-        f, g = 0.9 * middle.radius_m / away, 1.0 - 0.9 * pad.radius_m / away
-        _way(draft, [(x + t * (pad.x - x), y + t * (pad.y - y)) for t in (f, g)])
+        _way_to(draft, (x, y), pad, 0.9 * middle.radius_m)
     away = math.hypot(gx - x, gy - y)
     f = middle.radius_m * 0.9 / away
     _way(draft, [(gx, gy), (x + f * (gx - x), y + f * (gy - y))], 5.0)
@@ -281,18 +274,16 @@ def _fairground(draft: Draft, park: Park) -> list[Pad]:
         x = ground.x0 + (i + 0.5) * ground.width / nx + draft.number(-1.5, 1.5, "x", k)
         y = ground.y0 + (j + 0.5) * ground.depth / ny + draft.number(-1.0, 1.0, "y", k)
         pads.append(_pad(draft, x, y, draft.number(7.0, 8.2, "pad", k)))
-    keep = [pad.shape() for pad in pads]
-    for i in range(1, nx):
-        x = ground.x0 + i * ground.width / nx
-        for f in (0.2, 0.5, 0.8):
-            y = ground.y0 + f * ground.depth
-            if not any(one.intersects(shapely.box(x - 2, y - 5, x + 2, y + 5)) for one in keep):
-                _booths(draft, x, y, draft.pick([0.0, 180.0], "booth", i, f), 3)
-    for x, y in grid(Box(ground.x0 + 3, ground.y0 + 1.8, ground.x1 - 3, ground.y0 + 6.8), 5.0):
+    keep = shapely.union_all([pad.shape() for pad in pads])
+    for i, f in product(range(1, nx), (0.2, 0.5, 0.8)):
+        x, y = ground.x0 + i * ground.width / nx, ground.y0 + f * ground.depth
+        if not keep.intersects(Box.about(x, y, 4, 10).shape()):
+            _booths(draft, x, y, draft.pick([0.0, 180.0], "booth", i, f), 3)
+    for x, y in Box(ground.x0 + 3, ground.y0 + 1.8, ground.x1 - 3, ground.y0 + 6.8).grid(5.0):
         draft.slot("backstage", x, y, draft.pick([0.0, 180.0], "van", x), (7.2, 4.2))
-    for x, y in grid(ground.grown(-1.2), 6.5):
-        if not any(one.intersects(shapely.Point(x, y).buffer(1.5)) for one in keep):
-            draft.slot("plaza", x, y, draft.pick([0.0, 90.0, 180.0, 270.0], "lot", x, y), (2.6, 2.6))
+    for x, y in ground.grown(-1.2).grid(6.5):
+        if not keep.intersects(shapely.Point(x, y).buffer(1.5)):
+            draft.slot("plaza", x, y, draft.pick(SIDES, "lot", x, y), (2.6, 2.6))
     return pads
 
 
@@ -308,24 +299,19 @@ def _hills(draft: Draft, park: Park) -> list[Pad]:
         spots.append((round(x, 1), round(y, 1), radius, draft.number(0.8, 4.4, "high", k)))
     discs: list[Any] = [[x, y, round(radius + 1.2, 1), high] for x, y, radius, high in spots]
     discs.append([gx, round(gy, 1), 10.0, 0.0])
-    step(draft, "round_levels", discs=discs)
-    street = Box(
-        -draft.width_m / 2, min(gy, -s * draft.depth_m / 2), draft.width_m / 2, max(gy, -s * draft.depth_m / 2)
-    )
-    step(draft, "level_area", area=street.rounded(), to_m=0.0, blend_m=5.0)
+    draft.step("round_levels", discs=discs)
+    low, high = sorted((gy, -s * draft.half[1]))
+    street = draft.site._replace(y0=low, y1=high)
+    draft.step("level_area", area=street.rounded(), to_m=0.0, blend_m=5.0)
     pads = [_pad(draft, x, y, radius) for x, y, radius, _ in spots]
-    ways = [((gx, gy), pads[0]), ((gx, gy), pads[1])]
-    ways += [
-        ((a.x, a.y), b) for a, b in ((pads[0], pads[2]), (pads[1], pads[2]), (pads[2], pads[3]), (pads[2], pads[4]))
-    ]
-    for k, ((x, y), pad) in enumerate(ways):
-        away = math.hypot(pad.x - x, pad.y - y)
-        f, g = (0.0 if k < 2 else 8.0 / away), 1.0 - 0.9 * pad.radius_m / away
-        _way(draft, [(x + t * (pad.x - x), y + t * (pad.y - y)) for t in (f, g)])
-    step(draft, "level_under_things")
+    for pad in pads[:2]:
+        _way_to(draft, (gx, gy), pad, 0.0)
+    for a, b in ((0, 2), (1, 2), (2, 3), (2, 4)):
+        _way_to(draft, (pads[a].x, pads[a].y), pads[b], 8.0)
+    draft.step("level_under_things")
     return pads
 
 
-_TOPOLOGIES: dict[str, Callable[[Draft, Park], list[Pad]]] = {
+_TOPOLOGIES = {
     "midway": _midway, "lake": _lake, "star": _star, "fairground": _fairground, "hills": _hills,
 }  # fmt: skip

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import shapely
 
-from aerialdojo_gen.scenes.worlds.blocks import SIDES
 from aerialdojo_gen.scenes.worlds.draft import Draft
-from aerialdojo_gen.scenes.worlds.streets import Box, block_building, edge_slots, grid, street_along
+from aerialdojo_gen.scenes.worlds.shapes import SIDES, Box
+from aerialdojo_gen.scenes.worlds.streets import block_building, edge_slots, street_along
 
 _TREAD_M = 0.85
 _WORDS = ["ENERGY", "BANK", "RADIO", "FRESH", "TRAVEL", "CITY", "SPORT"]
@@ -26,7 +26,7 @@ class _Ground(NamedTuple):
 
     def core(self) -> Box:
         """Rectangle that stands are about."""
-        return Box(-self.half_x, self.y - self.half_y, self.half_x, self.y + self.half_y)
+        return Box.about(0.0, self.y, 2 * self.half_x, 2 * self.half_y)
 
     def back(self, rows: int) -> float:
         """How far from the core a stand of so many rows ends."""
@@ -35,10 +35,10 @@ class _Ground(NamedTuple):
 
 def write(draft: Draft) -> None:
     """Lay the street and the forecourt, then the pitch and its stands, courts, and what belongs about them."""
-    w, d, flip = draft.width_m / 2, draft.depth_m / 2, draft.pick([1, -1], "flip")
+    (w, d), flip = draft.half, draft.pick([1, -1], "flip")
     draft.section("The street and the forecourt")
     street = -flip * (d - 5.6)
-    half = street_along(draft, [(-w, street), (w, street)])
+    half = street_along(draft, street)
     ground = _Ground(draft.number(18.5, 21.0, "half_x"), draft.number(10.5, 12.5, "half_y"),
                      13.0 if draft.topology == "athletics" else 6.0, flip * draft.number(5.5, 8.0, "y"))  # fmt: skip
     draft.areas["core"] = ground.core().rounded()
@@ -51,16 +51,15 @@ def write(draft: Draft) -> None:
     _pitch(draft, ground)
     _car_park(draft, forecourt, flip)
     draft.section("Landmarks")
-    site = Box(-w, -d, w, d)
     for area in taken:
         draft.take(area)
     draft.take(ground.core().grown(2.0).shape())
-    spots = [p for p in grid(site.grown(-3.2), 4.0) if draft.is_free(shapely.Point(p).buffer(2.6))]
+    spots = [p for p in draft.site.grown(-3.2).grid(4.0) if draft.has_room(*p, 2.6)]
     draft.landmark([(*p, 270.0 if p[1] > ground.y else 90.0) for p in draft.shuffled(spots, "spots")])
-    _courts(draft, site)
-    edge_slots(draft, "tree", site.grown(-2.2), 6.0, (3.4, 3.4))
-    for x, y in grid(site.grown(-2.6), 5.2):
-        if draft.is_free(shapely.Point(x, y).buffer(1.9)):
+    _courts(draft)
+    edge_slots(draft, "tree", draft.site.grown(-2.2), 6.0, (3.4, 3.4))
+    for x, y in draft.site.grown(-2.6).grid(5.2):
+        if draft.has_room(x, y, 1.9):
             kind = "forecourt" if forecourt.shape().contains(shapely.Point(x, y)) else "about"
             draft.slot(kind, x, y, draft.pick(SIDES, "about", x, y), (4.4, 4.4))
     draft.fill_slots()
@@ -77,8 +76,7 @@ def _pitch(draft: Draft, ground: _Ground) -> None:
     )  # fmt: skip
     goals = [["goal_post", round(side * (half[0] - 0.6), 2), y, 180.0 if side > 0 else 0.0] for side in (-1, 1)]
     draft.add({"place": goals, "fit": "as_is"})
-    for x, v in grid(Box(core.x0 + 4, core.y0 + 1, core.x1 - 4, core.y1 - 1), 6.2):
-        draft.slot("pitch", x, v, draft.pick(SIDES, "pitch", x, v), (4.4, 4.4))
+    draft.slots_over("pitch", Box(core.x0 + 4, core.y0 + 1, core.x1 - 4, core.y1 - 1), 6.2, (4.4, 4.4))
     side = draft.pick([-1, 1], "benches")
     for k in range(6):
         x = -core.x1 + (k + 0.5) * core.width / 6
@@ -100,11 +98,11 @@ def _stand(draft: Draft, ground: _Ground, name: str, rows: int, region: Sequence
     stripes = {"width_m": draft.number(3, 8, "stripes", name), "shift_m": draft.number(0, 2.6, "shift", name)}
     draft.make("stand", node=f"{name}_stand", seats=seats, concrete=draft.material("terrace"), stripes=stripes,
                step="concrete:#d8d5cc", tier=tier)  # fmt: skip
-    parts: list[dict[str, Any]] = [
-        {"make": "stand_back_wall", "tier": tier, "top_m": round(1.1 + rows * 0.42 + 1.0, 2), "gates": [],
-         "gate_m": [3, 3.2], "wall": draft.material("wall"), "band": seats[0]},
-    ]  # fmt: skip
-    draft.add({"node": f"{name}_stand_walls", "category": "wall", "parts": parts})
+    wall = {
+        "make": "stand_back_wall", "tier": tier, "top_m": round(1.1 + rows * 0.42 + 1.0, 2), "gates": [],
+        "gate_m": [3, 3.2], "wall": draft.material("wall"), "band": seats[0],
+    }  # fmt: skip
+    draft.add({"node": f"{name}_stand_walls", "category": "wall", "parts": [wall]})
     core = ground.core().shape()
     ring = core.buffer(ground.back(rows) + 0.8).difference(core.buffer(ground.front_m - 0.6))
     return ring.intersection(shapely.box(*region))
@@ -121,6 +119,17 @@ def _roof(draft: Draft, ground: _Ground, name: str, rows: int, side: int, long_m
     ]})  # fmt: skip
 
 
+def _side_stand(
+    draft: Draft, ground: _Ground, name: str, rows: int, side: int, half_m: float
+) -> shapely.Polygon:  # fmt: skip
+    """Put up a stand with a roof along x, on the north for side 1."""
+    edge = ground.y + side * ground.half_y
+    y0, y1 = sorted((edge, edge + side * 90.0))
+    area = _stand(draft, ground, name, rows, (-half_m, y0, half_m, y1))
+    _roof(draft, ground, name, rows, side, 2 * half_m)
+    return area
+
+
 def _bowl(draft: Draft, ground: _Ground, flip: int) -> list[shapely.Polygon]:
     """Stands all round the pitch, a roof over one side or two."""
     rows = draft.whole(8, 11, "rows")
@@ -133,17 +142,12 @@ def _bowl(draft: Draft, ground: _Ground, flip: int) -> list[shapely.Polygon]:
 
 def _facing(draft: Draft, ground: _Ground, flip: int) -> list[shapely.Polygon]:
     """Two stands that face one another under roofs, banks of grass at the ends."""
-    out = []
-    x = ground.half_x - 1.0
-    for side in (-1, 1):
-        rows = draft.whole(6, 11, "rows", side)
-        name = "north" if side > 0 else "south"
-        edge = ground.y + side * ground.half_y
-        y0, y1 = sorted((edge, edge + side * 90.0))
+    areas = []
+    for side, name in ((-1, "south"), (1, "north")):
         draft.section(f"The {name} stand")
-        out.append(_stand(draft, ground, name, rows, (-x, y0, x, y1)))
-        _roof(draft, ground, name, rows, side, 2 * x)
-    return out
+        rows = draft.whole(6, 11, "rows", side)
+        areas.append(_side_stand(draft, ground, name, rows, side, ground.half_x - 1.0))
+    return areas
 
 
 def _horseshoe(draft: Draft, ground: _Ground, flip: int) -> list[shapely.Polygon]:
@@ -172,26 +176,20 @@ def _athletics(draft: Draft, ground: _Ground, flip: int) -> list[shapely.Polygon
     for side in (-1, 1):
         for v in (-0.4, 0.4):
             draft.slot("field", side * (reach + 0.6 * inner), y + v * inner, 90.0, (6.2, 7.0))
-    rows = draft.whole(7, 10, "rows")
-    edge = ground.y + flip * ground.half_y
-    y0, y1 = sorted((edge, edge + flip * 90.0))
     draft.section("The stand")
-    area = _stand(draft, ground, "main", rows, (-reach, y0, reach, y1))
-    _roof(draft, ground, "main", rows, flip, 2 * reach)
+    area = _side_stand(draft, ground, "main", draft.whole(7, 10, "rows"), flip, reach)
     return [area, shapely.LineString(line).buffer(inner + 8.6)]
 
 
 def _village(draft: Draft, ground: _Ground, flip: int) -> list[shapely.Polygon]:
     """A small stand and a clubhouse beside a pitch, courts about it."""
     rows, x = draft.whole(4, 6, "rows"), draft.number(9, 13, "stand")
-    edge = ground.y + flip * ground.half_y
-    y0, y1 = sorted((edge, edge + flip * 90.0))
     draft.section("The stand and the clubhouse")
-    area = _stand(draft, ground, "village", rows, (-x, y0, x, y1))
-    _roof(draft, ground, "village", rows, flip, 2 * x)
+    area = _side_stand(draft, ground, "village", rows, flip, x)
     side = draft.pick([-1, 1], "clubhouse")
     out = side * (ground.half_x + 9.0)
-    box = Box(min(out, out + side * 9.0), ground.y - 8.0, max(out, out + side * 9.0), ground.y + 8.0)
+    low, high = sorted((out, out + side * 9.0))
+    box = Box(low, ground.y - 8.0, high, ground.y + 8.0)
     storeys, facing = draft.whole(1, 2, "storeys"), 180.0 if side > 0 else 0.0
     block_building(draft, box, "clubhouse", storeys=storeys, street_deg=facing, category="clubhouse")
     return [area, ground.core().shape().buffer(5.0)]
@@ -203,33 +201,31 @@ def _car_park(draft: Draft, forecourt: Box, flip: int) -> None:
     if forecourt.depth < 13.0:
         return
     x = side * (forecourt.x1 - 3.0 - count * 1.35)
-    front = forecourt.y1 - 0.6 if flip > 0 else forecourt.y0 + 0.6
-    yaw = 270.0 if flip > 0 else 90.0
+    front, yaw = (forecourt.y1 - 0.6, 270.0) if flip > 0 else (forecourt.y0 + 0.6, 90.0)
     mouth = front - flip * 5.2
-    box = Box(x - count * 1.35, min(front, mouth - flip * 5.0), x + count * 1.35, max(front, mouth - flip * 5.0))
+    low, high = sorted((front, mouth - flip * 5.0))
+    box = Box(x - count * 1.35, low, x + count * 1.35, high)
     if not draft.is_free(box.shape()):
         return
     draft.paint(box.rounded(), draft.material("street"))
-    row = [round(x, 2), round(mouth, 2), yaw, count]
-    draft.make("parking_rows", rows=[row], occupancy=draft.knob("occupancy"))
+    draft.make("parking_rows", rows=[[round(x, 2), round(mouth, 2), yaw, count]], occupancy=draft.knob("occupancy"))
     draft.take(box.shape())
 
 
-def _courts(draft: Draft, site: Box) -> None:
+def _courts(draft: Draft) -> None:
     """Lay out courts where there is room: for tennis, balls, and a playground."""
     for k in range(3):
         wide, deep = (15.0, 10.0) if draft.chance(0.5, "court", k) else (10.0, 15.0)
-        for x, y in draft.shuffled(grid(site.grown(-2.0), 3.4), "court", k):
-            box = Box(x - wide / 2, y - deep / 2, x + wide / 2, y + deep / 2)
+        for x, y in draft.shuffled(draft.site.grown(-2.0).grid(3.4), "court", k):
+            box = Box.about(x, y, wide, deep)
             if draft.is_free(box.grown(0.6).shape()):
                 draft.paint(box.rounded(), draft.material("court", k))
                 draft.make("outline_marks", areas=[box.grown(-0.7).rounded()], width_m=0.1)
-                for u, v in grid(box, 5.0):
-                    draft.slot("court", u, v, draft.pick(SIDES, "court", u, v), (4.6, 4.6))
+                draft.slots_over("court", box, 5.0, (4.6, 4.6))
                 draft.take(box.grown(0.4).shape())
                 break
 
 
-_TOPOLOGIES: dict[str, Callable[[Draft, _Ground, int], list[shapely.Polygon]]] = {
+_TOPOLOGIES = {
     "bowl": _bowl, "facing": _facing, "athletics": _athletics, "village": _village, "horseshoe": _horseshoe,
 }  # fmt: skip
