@@ -42,11 +42,14 @@ def _kinds(
                 double_sided = material.double_sided or not foreign_only
                 key = (*_size(material), material.mask is not None, double_sided)
                 drawn.setdefault(key, []).append((part, material, k))
-    return [_kind(key, drawn[key], tags) for key in sorted(drawn)]
+    kinds = (_kind(key, drawn[key], tags) for key in sorted(drawn))
+    return [kind for kind in kinds if kind is not None]
 
 
-def _kind(key: _Key, drawn: list[tuple[Part, Material, int]], tags: tuple[str, ...]) -> Kind:
+def _kind(key: _Key, drawn: list[tuple[Part, Material, int]], tags: tuple[str, ...]) -> Kind | None:
     rows, part_of = packed(drawn)
+    if not len(rows):
+        return None
     layer = {material.name: material for _, material, _ in drawn if material.texture is not None}
     number = {name: k for k, name in enumerate(layer)}
     unlit = np.array([_UNLIT if material.unlit else 0 for _, material, _ in drawn])

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache, reduce
+from typing import Any
 
 import cv2
 import numpy as np
@@ -18,8 +19,7 @@ from numpy.typing import NDArray
 from aerialdojo_gen.base.kernels import njit
 from aerialdojo_gen.geometry.soup import soup
 from aerialdojo_gen.geometry.triangles import morton_codes
-from aerialdojo_gen.rendering.gl_culling import chunks_in_view, triangles_in_view
-from aerialdojo_gen.rendering.gl_tiles import Tiles
+from aerialdojo_gen.rendering.gl_culling import CHUNK_TRIANGLES, visible_triangles
 from aerialdojo_gen.rendering.lighting import is_fine, is_shiny, texel_m
 from aerialdojo_gen.rendering.shading import MUTE, muted
 from aerialdojo_gen.scenes.model import HORIZON, Material, Part, Scene
@@ -30,7 +30,6 @@ Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
 Indices = NDArray[np.int64]
 
-CHUNK_TRIANGLES = 96
 _LARGEST_TEXTURE = 512
 _FINE = "FINE"  # Tag of what has a texture larger than most
 _MORTON_BITS = 16
@@ -61,19 +60,16 @@ class Chunks:
     starts: NDArray[np.int64]  # (k + 1,) int64; first triangle of every chunk; the last is n
     low: Floats  # (k, 3) float64; a chunk's box, metres, world frame
     high: Floats
-    planes: Floats  # (n, 4) float64; a triangle faces the eye where ``normal . eye + d`` is positive
-    corners: NDArray[np.float32]  # (n, 9) float32
+    planes: Floats  # (k, 4 * 96) float64; a triangle faces the eye where ``normal . eye + d`` is positive
+    corners: Singles  # (k, 9 * 96) float32
 
-    def visible_indices(
-        self, clips: Floats, eye: Floats, tiles: Tiles, hides: bool = True
-    ) -> list[NDArray[np.uint32]]:
-        """Vertex indices (3 k,) per view of one eye, by chunk, nearest first."""
-        order, in_view = chunks_in_view(self.low, self.high, eye, clips)
-        indices, count = triangles_in_view(
-            order, in_view, self.starts, self.planes, self.corners, clips, eye, self.low, self.high, hides,
-            tiles.width, tiles.height, tiles.whole, tiles.part, tiles.covered,
-        )  # fmt: skip
-        return [row[:n] for row, n in zip(indices, count, strict=True)]
+    def visible_indices(self, clips: Floats, eye: Floats, nearness: Singles, hides: bool) -> list[NDArray[np.uint32]]:
+        """Vertex indices of every view of one eye, nearest first; what hides raises `nearness` (views, H, W)."""
+        out = np.empty((len(clips), len(self.vertices)), np.uint32)
+        counts = visible_triangles(
+            self.starts, self.low, self.high, self.planes, self.corners, hides, clips, eye, nearness, out
+        )
+        return [row[:n] for row, n in zip(out, counts.tolist(), strict=True)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,6 +126,7 @@ def own_kinds(scene: Scene) -> list[Kind]:
     return [
         Kind(cut(rows[kind_of == k]), tags, layers[_FINE in tags] if "TEXTURED" in tags else None)
         for tags, k in kinds.items()
+        if (kind_of == k).any()
     ]
 
 
@@ -233,12 +230,7 @@ def packed(drawn: Sequence[tuple[Part, Material, int]]) -> tuple[NDArray[np.void
 
 
 def cut(triangles: NDArray[np.void], double_sided: bool = False) -> Chunks:
-    """Cut packed triangles into chunks; double-sided triangles face every eye."""
-    if not len(triangles):
-        none = np.zeros((0, 3))
-        return Chunks(
-            triangles.ravel(), np.zeros(1, dtype=np.int64), none, none, np.zeros((0, 4)), _positions(triangles)
-        )
+    """Cut packed triangles, at least one, into chunks; double-sided triangles face every eye."""
     corners = triangles["position"].astype(np.float64)
     # NumPy takes five times as long along an axis of three.
     low, high = (reduce(of, np.moveaxis(corners, 1, 0)) for of in (np.minimum, np.maximum))
@@ -249,19 +241,24 @@ def cut(triangles: NDArray[np.void], double_sided: bool = False) -> Chunks:
     triangles, corners = triangles[order], corners[order]
     starts = np.arange(0, len(triangles), CHUNK_TRIANGLES)
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    offset = -np.einsum("ij,ij->i", normal, corners[:, 0])
+    planes = np.column_stack([normal, -np.einsum("ij,ij->i", normal, corners[:, 0])])
+    if double_sided:
+        planes[:] = 0.0, 0.0, 0.0, 1.0
     return Chunks(
         triangles.ravel(),
         np.append(starts, len(triangles)),
         np.minimum.reduceat(low[order], starts),
         np.maximum.reduceat(high[order], starts),
-        np.tile([0.0, 0.0, 0.0, 1.0], (len(normal), 1)) if double_sided else np.column_stack([normal, offset]),
-        _positions(triangles),
+        _blocks(planes),
+        _blocks(triangles["position"].reshape(-1, 9)),
     )
 
 
-def _positions(triangles: NDArray[np.void]) -> NDArray[np.float32]:
-    return np.ascontiguousarray(triangles["position"].reshape(-1, 9), dtype=np.float32)
+def _blocks(rows: NDArray[Any]) -> NDArray[Any]:
+    """Lay triangles' rows out by chunk, field and triangle, for vectorised loops."""
+    padded = np.pad(rows, ((0, -len(rows) % CHUNK_TRIANGLES), (0, 0)))
+    blocks = padded.reshape(-1, CHUNK_TRIANGLES, rows.shape[1]).transpose(0, 2, 1)
+    return np.ascontiguousarray(blocks).reshape(len(blocks), -1)
 
 
 def _bases(names: list[str]) -> list[str]:
