@@ -18,7 +18,7 @@ from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from aerialdojo_gen.base.kernels import njit
-from aerialdojo_gen.planning.column_kernels import DOWN, FLAT, KIND_OF, KINDS, UP
+from aerialdojo_gen.planning.connectivity import DOWN, FLAT, KIND_OF, KINDS, UP
 from aerialdojo_gen.planning.vectors import INT32, constant, data_of, floats, load, pointer, splat
 
 LANES = 16

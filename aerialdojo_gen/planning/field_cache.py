@@ -11,7 +11,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from aerialdojo_gen.base.kernels import njit
-from aerialdojo_gen.planning.column_kernels import QUANTUM_M
+from aerialdojo_gen.planning.connectivity import QUANTUM_M
 
 _CODEC = "lz4_raw"
 _UNREACHED = -1
