@@ -13,12 +13,13 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.base.constants import APPROACH, STOP
 from aerialdojo_gen.base.kernels import njit
+from aerialdojo_gen.geometry.arrays import Floats, Singles
 from aerialdojo_gen.geometry.motion import fly
 from aerialdojo_gen.planning.certify import ClearanceProfile, clearance_profile
 from aerialdojo_gen.planning.cost_to_go import cost_at, extra_cost
 from aerialdojo_gen.planning.grid_kernels import GridArrays
 from aerialdojo_gen.planning.hybrid_astar import FOUND, SearchArrays, SearchOptions, search
-from aerialdojo_gen.planning.refine import moves_to_actions
+from aerialdojo_gen.planning.refine import legs_to_actions
 
 # No Approach is needed for a goal nearer than this.
 _ON_GOAL_M = 1e-9
@@ -29,7 +30,7 @@ class PlanResult(NamedTuple):
 
     status: int  # One of `aerialdojo_gen.planning.hybrid_astar`: FOUND, EXHAUSTED, BUDGET
     expansions: int
-    poses: NDArray[np.float64]  # (K + 1, 4) float64; x, y, z in metres and yaw in (-pi, pi]; no rows unless FOUND
+    poses: Floats  # (K + 1, 4) float64; x, y, z in metres and yaw in (-pi, pi]; no rows unless FOUND
     actions: NDArray[np.int8]  # (K + 1,) int8; action at every pose, Stop at the last
     length: float  # The paper's L, metres
     profile: ClearanceProfile  # Of the route; meaningless unless FOUND
@@ -37,9 +38,8 @@ class PlanResult(NamedTuple):
 
 @njit(cache=True)
 def lengths_at(
-    points: NDArray[np.float64], goal: NDArray[np.float64], grid: GridArrays, moves: NDArray[np.uint32],
-    cost: NDArray[np.float32], clearance_cost: NDArray[np.float32],
-) -> NDArray[np.float64]:  # fmt: skip
+    points: Floats, goal: Floats, grid: GridArrays, moves: NDArray[np.uint32], cost: Singles, clearance_cost: Singles
+) -> Floats:
     """Lengths of the cheapest grid paths from points, (n, 3) float64 metres; (n,) float64 metres."""
     values = np.empty(len(points))
     for i in range(len(points)):
@@ -51,7 +51,7 @@ def lengths_at(
 
 
 @njit(cache=True)
-def costs_at(points: NDArray[np.float64], grid: GridArrays, cost: NDArray[np.float32]) -> NDArray[np.float64]:
+def costs_at(points: Floats, grid: GridArrays, cost: Singles) -> Floats:
     """Cost-to-go of points, (n, 3) float64 metres; (n,) float64 metres."""
     values = np.empty(len(points))
     for i in range(len(points)):
@@ -61,10 +61,10 @@ def costs_at(points: NDArray[np.float64], grid: GridArrays, cost: NDArray[np.flo
 
 @njit(cache=True)
 def plan_once(
-    start: NDArray[np.float64],
-    goal: NDArray[np.float64],
+    start: Floats,
+    goal: Floats,
     goal_heading: int,
-    cost_to_go: NDArray[np.float32],
+    cost_to_go: Singles,
     grid: GridArrays,
     memory: SearchArrays,
     options: SearchOptions,
@@ -72,11 +72,11 @@ def plan_once(
     bound: float,
 ) -> PlanResult:
     """Search a route from a pose (4,) to a goal (3,), order its moves, fly it and measure its clearance, metres."""
-    status, expansions, moves = search(start, goal, goal_heading, cost_to_go, grid, memory, options)
+    status, expansions, directions, metres = search(start, goal, goal_heading, cost_to_go, grid, memory, options)
     if status != FOUND:
         no_profile = ClearanceProfile(np.empty((0, 3)), False, np.empty(0, np.bool_), 0.0)
         return PlanResult(status, expansions, np.empty((0, 4)), np.empty(0, np.int8), 0.0, no_profile)
-    moved = moves_to_actions(start, moves, goal_heading, options, grid)
+    moved = legs_to_actions(start, directions, metres, goal_heading, options, grid)
     poses = fly(start, moved)
     n = len(moved)
     dx, dy, dz = goal[0] - poses[n, 0], goal[1] - poses[n, 1], goal[2] - poses[n, 2]

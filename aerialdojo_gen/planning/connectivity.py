@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.base.kernels import njit
+from aerialdojo_gen.geometry.arrays import Flags, Singles
 from aerialdojo_gen.planning.grid_kernels import GridArrays, segment_free
 from aerialdojo_gen.planning.preference import CLEARANCE_COST_UNIT
 
@@ -32,7 +33,7 @@ _SQRT2, _SQRT5 = math.sqrt(2.0), math.sqrt(5.0)
 
 
 @njit(cache=True)
-def move_lengths(cell: float) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+def move_lengths(cell: float) -> tuple[Singles, Singles]:
     """Lengths of moves, and factors of the clearance cost of the cell that they leave; metres, whole quanta."""
     lengths = (np.rint(MOVE_LENGTHS * cell / QUANTUM_M) * QUANTUM_M).astype(np.float32)
     return lengths, (np.rint(MOVE_LENGTHS * cell / _COARSE_M) * _COARSE_M).astype(np.float32)
@@ -77,9 +78,7 @@ def _both_detours_passable(moves: NDArray[np.uint32], i: int, j: int, k: int, m:
 
 
 @njit(cache=True)
-def _passable(
-    moves: NDArray[np.uint32], i: int, j: int, k: int, m: int, radius: float, grid: GridArrays
-) -> bool:  # fmt: skip
+def _passable(moves: NDArray[np.uint32], i: int, j: int, k: int, m: int, radius: float, grid: GridArrays) -> bool:
     """Whether a move that the distance field does not prove free is passable."""
     # Both detours pass half a cell from the middle of the square: a thinner body would leave room for a pole there.
     if 2.0 * radius >= grid.cell:
@@ -131,7 +130,7 @@ def passable_moves(grid: GridArrays, radius: float) -> NDArray[np.uint32]:
 
 
 @njit(cache=True, nogil=True)
-def connected_with_ceiling(moves: NDArray[np.uint32]) -> NDArray[np.bool_]:
+def connected_with_ceiling(moves: NDArray[np.uint32]) -> Flags:
     """Cells, (nx, ny, nz) bool, that `passable_moves` connects with the highest layer that has any."""
     nx, ny, nz = moves.shape
     visited = np.zeros((nx, ny, nz), np.bool_)
@@ -160,9 +159,7 @@ def connected_with_ceiling(moves: NDArray[np.uint32]) -> NDArray[np.bool_]:
 
 
 @njit(cache=True)
-def reaches_marked_cell(
-    x: float, y: float, z: float, radius: float, marked: NDArray[np.bool_], grid: GridArrays
-) -> bool:
+def reaches_marked_cell(x: float, y: float, z: float, radius: float, marked: Flags, grid: GridArrays) -> bool:
     """Whether the body at a point can move straight to one of the 64 nearest cells that is marked."""
     nx, ny, nz = marked.shape
     i0 = math.floor((x - grid.origin[0]) / grid.cell - 0.5)

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.base.kernels import njit
+from aerialdojo_gen.geometry.arrays import Flags, Floats, Int32s, Singles
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.column_lanes import LANES, MIN_CELLS, relax_column, relax_flat
 from aerialdojo_gen.planning.connectivity import (
@@ -31,7 +32,7 @@ from aerialdojo_gen.planning.connectivity import (
     move_lengths,
 )
 from aerialdojo_gen.planning.grid_kernels import GridArrays, segment_free
-from aerialdojo_gen.planning.preference import NO_PREFERENCE, Preference, approach_penalty, clearance_penalty
+from aerialdojo_gen.planning.preference import NO_PREFERENCE, Preference, approach_penalty, leg_penalty
 
 # Columns are queued in bins half a cell wide; the longest move is just under five bins.
 _BINS = 8
@@ -44,8 +45,8 @@ _EVERYWHERE_M = 1e6
 class Area(NamedTuple):
     """The part of a grid in which costs are computed."""
 
-    start: NDArray[np.float64]  # (3,) float64; cells are left out where the straight way from here
-    goal: NDArray[np.float64]  # and `weight` times that to the goal, less what an Approach saves,
+    start: Floats  # (3,) float64; cells are left out where the straight way from here
+    goal: Floats  # and `weight` times that to the goal, less what an Approach saves,
     approach: float
     weight: float
     reach: float  # exceed this, metres
@@ -58,10 +59,10 @@ class Memory(NamedTuple):
 
     first: NDArray[np.int16]  # (nx, ny) int16; range of its cells within reach
     last: NDArray[np.int16]  # 0 where that is not known yet, -1 for none
-    limit: NDArray[np.float32]  # (nx, ny) float32; maximum cost of these cells, metres
-    waiting: NDArray[np.bool_]  # (nx, ny) bool; queued columns
-    next: NDArray[np.int32]  # (nx * ny,) int32; columns in bins, as linked lists
-    written: NDArray[np.int32]  # (nx * ny,) int32; columns in the order in which they were reached
+    limit: Singles  # (nx, ny) float32; maximum cost of these cells, metres
+    waiting: Flags  # (nx, ny) bool; queued columns
+    next: Int32s  # (nx * ny,) int32; columns in bins, as linked lists
+    written: Int32s  # (nx * ny,) int32; columns in the order in which they were reached
 
 
 def make_memory(shape: tuple[int, ...]) -> Memory:
@@ -74,10 +75,10 @@ def make_memory(shape: tuple[int, ...]) -> Memory:
 
 
 def cost_to_go(
-    goal: NDArray[np.float64], grid: ClearanceGrid, approach: float, bound: float, reach: float,
-    prefer: Preference = NO_PREFERENCE, clearance_cost: NDArray[np.float32] | None = None,
-    cost: NDArray[np.float32] | None = None,
-) -> NDArray[np.float32]:  # fmt: skip
+    goal: Floats, grid: ClearanceGrid, approach: float, bound: float, reach: float,
+    prefer: Preference = NO_PREFERENCE, clearance_cost: Singles | None = None,
+    cost: Singles | None = None,
+) -> Singles:  # fmt: skip
     """Cheapest costs over passable moves to a goal (4,) from cells up to `bound`, (nx, ny, nz) metres; inf elsewhere.
 
     `prefer` is what the Approach costs and `clearance_cost` what the cells do; `reach` metres from the goal's column
@@ -95,8 +96,8 @@ def cost_to_go(
 @njit(cache=True)
 def seed_goal(
     gx: float, gy: float, gz: float, yaw: float, reach: float, radius: float,
-    grid: GridArrays, moves: NDArray[np.uint32], cost: NDArray[np.float32], prefer: Preference,
-) -> NDArray[np.int32]:  # fmt: skip
+    grid: GridArrays, moves: NDArray[np.uint32], cost: Singles, prefer: Preference,
+) -> Int32s:  # fmt: skip
     """Write the cost of the straight path to the goal into the free cells within `reach`; return their indices."""
     nx, ny, nz = cost.shape
     found = np.empty(4096, np.int32)
@@ -122,8 +123,7 @@ def seed_goal(
                 d = math.sqrt((x - gx) ** 2 + (y - gy) ** 2 + (z - gz) ** 2)
                 if d <= reach and segment_free(x, y, z, gx, gy, gz, radius, grid, False):
                     d += approach_penalty(gx - x, gy - y, yaw, d, prefer.ahead_cos, prefer.approach_penalty)
-                    d += clearance_penalty(x, y, z, gx, gy, gz, prefer.clearance, prefer.weight,
-                                 grid.origin[0], grid.origin[1], grid.origin[2], grid.cell, grid.field)  # fmt: skip
+                    d += leg_penalty(x, y, z, gx, gy, gz, prefer, grid)
                     cost[i, j, k] = round(d / QUANTUM_M) * QUANTUM_M
                     found[n] = (i * ny + j) * nz + k
                     n += 1
@@ -131,8 +131,8 @@ def seed_goal(
 
 
 def expand_cost(
-    seeds: NDArray[np.int32], bound: float, reach: float, grid: GridArrays, moves: NDArray[np.uint32],
-    cost: NDArray[np.float32], clearance_cost: NDArray[np.float32],
+    seeds: Int32s, bound: float, reach: float, grid: GridArrays, moves: NDArray[np.uint32],
+    cost: Singles, clearance_cost: Singles,
 ) -> int:  # fmt: skip
     """Write the costs from seeded cells on into `cost` (nx, ny, nz); return the column visits."""
     lacking = max(0, MIN_CELLS - cost.shape[2])
@@ -173,8 +173,8 @@ def _span(i: int, j: int, area: Area, grid: GridArrays, nz: int) -> tuple[int, i
 
 @njit(cache=True, error_model="numpy")
 def expand(
-    seeds: NDArray[np.int32], area: Area, grid: GridArrays, moves: NDArray[np.uint32], cost: NDArray[np.float32],
-    clearance_cost: NDArray[np.float32], memory: Memory,
+    seeds: Int32s, area: Area, grid: GridArrays, moves: NDArray[np.uint32], cost: Singles,
+    clearance_cost: Singles, memory: Memory,
 ) -> tuple[int, int]:  # fmt: skip
     """Write the costs from seeded cells on, a column at a time; return how many columns are written, and visits.
 
@@ -235,8 +235,8 @@ def expand(
 
 @njit(cache=True)
 def extra_cost(
-    x: float, y: float, z: float, goal: NDArray[np.float64], grid: GridArrays, moves: NDArray[np.uint32],
-    cost: NDArray[np.float32], clearance_cost: NDArray[np.float32],
+    x: float, y: float, z: float, goal: Floats, grid: GridArrays, moves: NDArray[np.uint32],
+    cost: Singles, clearance_cost: Singles,
 ) -> float:  # fmt: skip
     """The part of a point's cost-to-go that is not length, along the cheapest grid path; 0 if unreached."""
     nx, ny, nz = cost.shape
@@ -272,15 +272,13 @@ def extra_cost(
 
 
 @njit(cache=True)
-def cost_at(x: float, y: float, z: float, grid: GridArrays, cost: NDArray[np.float32]) -> float:
+def cost_at(x: float, y: float, z: float, grid: GridArrays, cost: Singles) -> float:
     """Cost-to-go of a point, metres: trilinear between the 8 nearest cells if they agree, else via the cheapest."""
     return cost_between(x, y, z, grid.origin[0], grid.origin[1], grid.origin[2], grid.cell, cost)
 
 
 @njit(cache=True, error_model="numpy")
-def cost_between(
-    x: float, y: float, z: float, ox: float, oy: float, oz: float, cell: float, cost: NDArray[np.float32]
-) -> float:  # fmt: skip
+def cost_between(x: float, y: float, z: float, ox: float, oy: float, oz: float, cell: float, cost: Singles) -> float:
     """`cost_at` for inner loops, where passing a tuple of arrays costs more than the work; inf if unreached."""
     nx, ny, nz = cost.shape
     fx, fy, fz = (x - ox) / cell - 0.5, (y - oy) / cell - 0.5, (z - oz) / cell - 0.5

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from aerialdojo_gen.base.config.sections import PlanConfig, SearchAttempt
 from aerialdojo_gen.base.constants import RADIUS_M
+from aerialdojo_gen.geometry.arrays import Floats, Int32s, Singles
 from aerialdojo_gen.geometry.motion import TURN_RAD, nearest_heading
 from aerialdojo_gen.planning.attempt import costs_at, lengths_at, plan_once
 from aerialdojo_gen.planning.certify import certify
@@ -61,7 +62,7 @@ class Route:
     """
 
     outcome: str
-    poses: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 4)))
+    poses: Floats = field(default_factory=lambda: np.empty((0, 4)))
     actions: NDArray[np.int8] = field(default_factory=lambda: np.empty(0, np.int8))
     length_m: float = 0.0
     expansions: int = 0
@@ -225,7 +226,7 @@ class Planner:
         finally:
             self._cost, self._fields = self._scratch, FieldCache(0, 0)
 
-    def cost_to_go(self, points: ArrayLike) -> NDArray[np.float64]:
+    def cost_to_go(self, points: ArrayLike) -> Floats:
         """Cost-to-go of points, (n, 3) float metres; (n,) float64 metres.
 
         It is that of the last goal of `plan_target` or `estimate_routes`.
@@ -233,14 +234,14 @@ class Planner:
         p = np.ascontiguousarray(np.asarray(points, np.float64).reshape(-1, 3))
         return np.asarray(costs_at(p, self.grid.arrays, self._cost))
 
-    def _blocked(self, start: NDArray[np.float64]) -> bool:
+    def _blocked(self, start: Floats) -> bool:
         # All goals of a scene share its anchors as starts.
         key = start[:3].tobytes()
         if key not in self._blocked_starts:
             self._blocked_starts[key] = self.grid.in_collision(start[:3])
         return self._blocked_starts[key]
 
-    def _expand(self, goal: NDArray[np.float64]) -> None:
+    def _expand(self, goal: Floats) -> None:
         cached = self._fields.find(goal.tobytes(), self._scratch)
         if cached is not None:
             self._cost = cached
@@ -256,13 +257,13 @@ class Planner:
     def _near_field(self) -> NearField:
         c, g = self.config, self.grid
 
-        def seed(goal: NDArray[np.float64], cost: NDArray[np.float32]) -> NDArray[np.int32]:
+        def seed(goal: Floats, cost: Singles) -> Int32s:
             prefer = self._prefer_on_grid
             return np.asarray(seed_goal(*goal, c.max_approach_m, g.radius_m, g.arrays, g.moves, cost, prefer))
 
         return NearField(g, self._clearance_cost, c.ladder[0].weight, c.max_approach_m, self._bound_m, seed)
 
-    def _estimate(self, start: NDArray[np.float64], goal: NDArray[np.float64], value: float) -> Route:
+    def _estimate(self, start: Floats, goal: Floats, value: float) -> Route:
         if not value <= self._longest_m:
             return Route("NO_PATH")
         # The grid path is collision-free, so the shortest route is no longer: `filter` would reject the task.
@@ -270,9 +271,8 @@ class Planner:
         return Route("NEAR_STRAIGHT" if straight else "NOT_NEEDED", cost_to_go_m=value)
 
     def _search(
-        self, start: NDArray[np.float64], goal: NDArray[np.float64], value: float, cost: NDArray[np.float32],
-        ladder: tuple[SearchAttempt, ...],
-    ) -> Route:  # fmt: skip
+        self, start: Floats, goal: Floats, value: float, cost: Singles, ladder: tuple[SearchAttempt, ...]
+    ) -> Route:
         c, g = self.config, self.grid
         heading = nearest_heading(float(start[3]), float(goal[3]))
         expansions = 0
@@ -301,7 +301,7 @@ class Planner:
         return Route(outcome, expansions=expansions, cost_to_go_m=value, attempts=len(ladder))
 
 
-def _poses(goal: ArrayLike, starts: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _poses(goal: ArrayLike, starts: ArrayLike) -> tuple[Floats, Floats]:
     return np.asarray(goal, np.float64), np.asarray(starts, np.float64).reshape(-1, 4)
 
 

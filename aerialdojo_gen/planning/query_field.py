@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.base.kernels import njit
+from aerialdojo_gen.geometry.arrays import Floats, Int32s, Singles
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.connectivity import MOVES, grid_metric, move_lengths
 from aerialdojo_gen.planning.cost_to_go import Area, Memory, expand, make_memory
@@ -36,11 +37,11 @@ _GAVE_UP = -1.0
 class PathArrays(NamedTuple):
     """Working memory of a search for a grid path; untouched pages cost nothing."""
 
-    heads: NDArray[np.int32]  # (_N_BUCKETS,) int32; first open entry of every bucket, -1 for none
-    cell: NDArray[np.int32]  # (n,) arrays
-    cost: NDArray[np.float32]
-    next: NDArray[np.int32]
-    touched: NDArray[np.int32]  # (n,) int32; cells whose cost was written
+    heads: Int32s  # (_N_BUCKETS,) int32; first open entry of every bucket, -1 for none
+    cell: Int32s  # (n,) arrays
+    cost: Singles
+    next: Int32s
+    touched: Int32s  # (n,) int32; cells whose cost was written
 
 
 def make_path_arrays() -> PathArrays:
@@ -53,8 +54,8 @@ def make_path_arrays() -> PathArrays:
 
 @njit(cache=True, error_model="numpy")
 def short_path_cost(
-    seeds: NDArray[np.int32], x: float, y: float, z: float, bound: float, grid: GridArrays, moves: NDArray[np.uint32],
-    clearance_cost: NDArray[np.float32], costs: NDArray[np.float32], arrays: PathArrays,
+    seeds: Int32s, x: float, y: float, z: float, bound: float, grid: GridArrays, moves: NDArray[np.uint32],
+    clearance_cost: Singles, costs: Singles, arrays: PathArrays,
 ) -> float:  # fmt: skip
     """Metres of a short grid path from a start to the seeds, within `_WEIGHT` of the least; inf, or `_GAVE_UP`."""
     nx, ny, nz = costs.shape
@@ -136,7 +137,7 @@ def reach_margin(cell: float, weight: float) -> float:
 
 
 @njit(cache=True)
-def _clear(n: int, seeds: NDArray[np.int32], cost: NDArray[np.float32], memory: Memory) -> None:
+def _clear(n: int, seeds: Int32s, cost: Singles, memory: Memory) -> None:
     """Reset the costs and the memory of an expansion that wrote n columns."""
     ny, nz = cost.shape[1], cost.shape[2]
     for seed in seeds:
@@ -155,7 +156,7 @@ _SURPLUS_M = 1.1
 class QueryResult(NamedTuple):
     """Cost-to-go between a start and a goal."""
 
-    cost: NDArray[np.float32] | None  # (nx, ny, nz) float32 or None
+    cost: Singles | None  # (nx, ny, nz) float32 or None
     unreachable: bool  # There is no grid path
     reach_m: float  # Costs are complete up to this
 
@@ -167,8 +168,8 @@ class NearField:
     """
 
     def __init__(
-        self, grid: ClearanceGrid, clearance_cost: NDArray[np.float32], weight: float, approach: float, bound: float,
-        seed: Callable[[NDArray[np.float64], NDArray[np.float32]], NDArray[np.int32]],
+        self, grid: ClearanceGrid, clearance_cost: Singles, weight: float, approach: float, bound: float,
+        seed: Callable[[Floats, Singles], Int32s],
     ) -> None:  # fmt: skip
         self._grid, self._clearance_cost, self._seed = grid, clearance_cost, seed
         self._weight, self._approach, self._bound = weight, approach, bound
@@ -176,9 +177,7 @@ class NearField:
         self._memory, self._path = make_memory(grid.moves.shape), make_path_arrays()
 
     @contextmanager
-    def between(
-        self, goal: NDArray[np.float64], start: NDArray[np.float64], min_reach: float
-    ) -> Iterator[QueryResult]:
+    def between(self, goal: Floats, start: Floats, min_reach: float) -> Iterator[QueryResult]:
         """Yield the costs that a search from a start (4,) to a goal (4,) needs; valid until the block ends."""
         cost, cells, moves, weight = self._cost, self._grid.arrays, self._grid.moves, self._weight
         seeds = self._seed(goal, cost)

@@ -14,11 +14,12 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.base.constants import MOVE_DOWN_1, MOVE_UP_1, TURN_LEFT, TURN_RIGHT
 from aerialdojo_gen.base.kernels import njit
+from aerialdojo_gen.geometry.arrays import Floats, Ints
 from aerialdojo_gen.geometry.motion import N_HEADINGS, QUARTER, TURN_RAD
 from aerialdojo_gen.planning.grid_kernels import GridArrays, inside, segment_free
 from aerialdojo_gen.planning.hybrid_astar import SearchOptions
-from aerialdojo_gen.planning.preference import Preference, clearance_penalty
-from aerialdojo_gen.planning.translations import DOWN, LIFTS_M, N_FLAT, N_STEPS, STEPS_M, UP, turns_between
+from aerialdojo_gen.planning.preference import Preference, leg_penalty
+from aerialdojo_gen.planning.translations import DOWN, UP, fewest_moves, turns_between
 
 _MOVE_FORWARD_1, _MOVE_LEFT_1, _MOVE_RIGHT_1 = 1, 4, 7
 _MAX_PASSES = 50
@@ -34,7 +35,7 @@ def _opposite(a: int, b: int) -> bool:
 
 
 @njit(cache=True)
-def _merge(direction: NDArray[np.int64], metres: NDArray[np.int64], n: int) -> int:
+def _merge(direction: Ints, metres: Ints, n: int) -> int:
     """Join neighbouring legs of one direction and cancel opposite ones, in place; return how many are left."""
     m = 0
     for i in range(n):
@@ -57,18 +58,10 @@ def _merge(direction: NDArray[np.int64], metres: NDArray[np.int64], n: int) -> i
     return m
 
 
-@njit(cache=True, inline="always")
-def _fewest_moves(direction: int, metres: int) -> int:
-    if direction >= N_HEADINGS:
-        return (metres + 1) // 2
-    rest = metres % 5
-    return metres // 5 + rest // 3 + rest % 3
-
-
 @njit(cache=True)
 def _headings(
-    direction: NDArray[np.int64], metres: NDArray[np.int64], n: int, goal_heading: int, sideways: float,
-    chosen: NDArray[np.int64], best: NDArray[np.float64], back: NDArray[np.int64], at: NDArray[np.int64],
+    direction: Ints, metres: Ints, n: int, goal_heading: int, sideways: float,
+    chosen: Ints, best: Floats, back: Ints, at: Ints,
 ) -> float:  # fmt: skip
     """Choose the heading of every leg, so that turns and metres flown sideways cost least; return that cost.
 
@@ -114,58 +107,37 @@ def _leg_end(x: float, y: float, z: float, yaw: float, d: int, metres: int) -> t
     return x + math.cos(yaw + d * TURN_RAD) * metres, y + math.sin(yaw + d * TURN_RAD) * metres, z
 
 
-@njit(cache=True, inline="always")
-def _leg_clearance_cost(
-    x: float, y: float, z: float, u: float, v: float, w: float, prefer: Preference, grid: GridArrays
-) -> float:  # fmt: skip
-    """Clearance cost of a leg, metres."""
-    return clearance_penalty(
-        x, y, z, u, v, w, prefer.clearance, prefer.weight,
-        grid.origin[0], grid.origin[1], grid.origin[2], grid.cell, grid.field,
-    )  # fmt: skip
-
-
 @njit(cache=True)
 def _fly_legs(
-    start: NDArray[np.float64], direction: NDArray[np.int64], metres: NDArray[np.int64], n: int,
-    prefer: Preference, grid: GridArrays, points: NDArray[np.float64], cost_before: NDArray[np.float64],
+    start: Floats, direction: Ints, metres: Ints, n: int,
+    prefer: Preference, grid: GridArrays, points: Floats, cost_before: Floats,
 ) -> None:  # fmt: skip
     """Write every leg's start, and the clearance cost of the legs before it."""
     x, y, z = start[0], start[1], start[2]
     points[0, 0], points[0, 1], points[0, 2], cost_before[0] = x, y, z, 0.0
     for i in range(n):
         u, v, w = _leg_end(x, y, z, start[3], direction[i], metres[i])
-        cost_before[i + 1] = cost_before[i] + _leg_clearance_cost(x, y, z, u, v, w, prefer, grid)
+        cost_before[i + 1] = cost_before[i] + leg_penalty(x, y, z, u, v, w, prefer, grid)
         x, y, z = u, v, w
         points[i + 1, 0], points[i + 1, 1], points[i + 1, 2] = x, y, z
 
 
 @njit(cache=True)
 def _with_leg_moved(
-    direction: NDArray[np.int64], metres: NDArray[np.int64], n: int, source: int, target: int,
-    new_direction: NDArray[np.int64], new_metres: NDArray[np.int64],
-) -> int:  # fmt: skip
+    direction: Ints, metres: Ints, n: int, source: int, target: int, new_direction: Ints, new_metres: Ints
+) -> int:
     """Write the legs with one moved elsewhere, joined where possible; return their number."""
-    k = 0
-    for i in range(n):
-        if i == source:
-            continue
-        if k == target:
-            new_direction[k], new_metres[k] = direction[source], metres[source]
-            k += 1
+    for k in range(n):
+        i = k - int(k > target)
+        i = source if k == target else i + int(i >= source)
         new_direction[k], new_metres[k] = direction[i], metres[i]
-        k += 1
-    if k == target:
-        new_direction[k], new_metres[k] = direction[source], metres[source]
-        k += 1
-    return _merge(new_direction, new_metres, k)
+    return _merge(new_direction, new_metres, n)
 
 
 @njit(cache=True)
 def _reorder(
-    start: NDArray[np.float64], direction: NDArray[np.int64], metres: NDArray[np.int64], n: int, goal_heading: int,
-    options: SearchOptions, grid: GridArrays,
-) -> int:  # fmt: skip
+    start: Floats, direction: Ints, metres: Ints, n: int, goal_heading: int, options: SearchOptions, grid: GridArrays
+) -> int:
     """Move single legs within the sequence while that is free and makes the route cheaper, in place.
 
     Only the legs between the old and the new place move, so only they are checked again.
@@ -179,7 +151,7 @@ def _reorder(
     _fly_legs(start, direction, metres, n, prefer, grid, points, cost_before)
     cost = cost_before[n]
     for i in range(n):
-        cost += metres[i] + action * _fewest_moves(direction[i], metres[i])
+        cost += metres[i] + action * fewest_moves(direction[i], metres[i])
     cost += action * _headings(direction, metres, n, goal_heading, options.sideways, chosen, best, back, at)
     for _ in range(_MAX_PASSES):
         improved = False
@@ -202,7 +174,7 @@ def _reorder(
                 cost_limit = cost - _MIN_GAIN_M
                 new_cost = cost_before[lead] + cost_before[n] - cost_before[n - tail]
                 for i in range(m):
-                    new_cost += new_metres[i] + action * _fewest_moves(new_direction[i], new_metres[i])
+                    new_cost += new_metres[i] + action * fewest_moves(new_direction[i], new_metres[i])
                 if new_cost >= cost_limit:
                     continue
                 new_cost += action * _headings(
@@ -213,7 +185,7 @@ def _reorder(
                     if new_cost >= cost_limit:
                         break
                     u, v, w = _leg_end(x, y, z, start[3], new_direction[i], new_metres[i])
-                    new_cost += _leg_clearance_cost(x, y, z, u, v, w, prefer, grid)
+                    new_cost += leg_penalty(x, y, z, u, v, w, prefer, grid)
                     x, y, z = u, v, w
                 if new_cost >= cost_limit:
                     continue
@@ -260,25 +232,12 @@ def _write_moves(actions: NDArray[np.int8], k: int, first: int, steps: tuple[int
 
 
 @njit(cache=True)
-def moves_to_actions(
-    start: NDArray[np.float64],
-    moves: NDArray[np.int8],
-    goal_heading: int,
-    options: SearchOptions,
-    grid: GridArrays,
+def legs_to_actions(
+    start: Floats, direction: Ints, metres: Ints, goal_heading: int, options: SearchOptions, grid: GridArrays
 ) -> NDArray[np.int8]:
-    """Turn the search's moves (n,) into actions (m,), including the turns to the final heading."""
-    direction, metres = np.empty(len(moves) + 1, np.int64), np.empty(len(moves) + 1, np.int64)
-    total = 0
-    for i in range(len(moves)):
-        move = int(moves[i])
-        if move < N_FLAT:
-            direction[i], metres[i] = move // N_STEPS, int(STEPS_M[move % N_STEPS])
-        else:
-            lift = LIFTS_M[move - N_FLAT]
-            direction[i], metres[i] = (UP if lift > 0 else DOWN), int(abs(lift))
-        total += metres[i]
-    n = _merge(direction, metres, len(moves))
+    """Turn legs (n,), in place, into actions (m,), including the turns to the final heading."""
+    total = metres.sum()
+    n = _merge(direction, metres, len(direction))
     n = _reorder(start, direction, metres, n, goal_heading, options, grid)
     chosen, best = np.empty(n + 1, np.int64), np.empty((n + 1, 3))
     back, at = np.empty((n + 1, 3), np.int64), np.empty((n + 1, 3), np.int64)

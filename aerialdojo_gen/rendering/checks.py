@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.base.kernels import njit
+from aerialdojo_gen.geometry.arrays import Bytes, Floats, Ints
 from aerialdojo_gen.geometry.cameras import Camera
 from aerialdojo_gen.geometry.rays import TriangleRayCaster
 from aerialdojo_gen.geometry.soup import soup
@@ -30,8 +31,6 @@ from aerialdojo_gen.rendering.picture import NEAR_M, Picture
 from aerialdojo_gen.rendering.texels import masked_caster
 from aerialdojo_gen.scenes.context import context_of
 from aerialdojo_gen.scenes.model import Scene
-
-Floats = NDArray[np.float64]
 
 FLAGS = ("missing", "black", "uniform", "frozen", "depth_invalid", "depth_mismatch", "camera_inside")
 DEPTH_FLAGS = frozenset({"missing", "depth_invalid", "depth_mismatch", "camera_inside"})
@@ -157,7 +156,7 @@ def picture_flags(picture: Picture) -> set[str]:
 
 
 @njit(cache=True)
-def _darkness(rgb: NDArray[np.uint8]) -> tuple[float, int]:
+def _darkness(rgb: Bytes) -> tuple[float, int]:
     """Share of black pixels and widest range of a colour, of every fourth pixel each way."""
     least_red = least_green = least_blue = np.uint8(255)
     most_red = most_green = most_blue = np.uint8(0)
@@ -180,10 +179,10 @@ def _equal(one: NDArray[Any], other: NDArray[Any]) -> bool:
 
 
 @lru_cache
-def _samples(height: int, width: int, a_side: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _samples(height: int, width: int, a_side: int) -> tuple[Ints, Ints]:
     rows, cols = np.meshgrid(_lattice(height, a_side), _lattice(width, a_side), indexing="ij")
     return rows.ravel(), cols.ravel()
 
 
-def _lattice(n: int, k: int) -> NDArray[np.int64]:
+def _lattice(n: int, k: int) -> Ints:
     return np.unique(np.linspace(1, n - 2, k + 2)[1:-1].astype(np.int64))

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.base.errors import RenderError
+from aerialdojo_gen.geometry.arrays import Bytes, Floats, Int32s, Singles
 from aerialdojo_gen.geometry.cameras import Camera
 from aerialdojo_gen.rendering import gl_programs
 from aerialdojo_gen.rendering import gl_shaders as glsl
@@ -28,8 +29,6 @@ from aerialdojo_gen.rendering.picture import FAR_M, NEAR_M, Picture, Renderer
 from aerialdojo_gen.rendering.shading import SIDE
 from aerialdojo_gen.scenes.light import Light
 from aerialdojo_gen.scenes.model import Scene
-
-Floats = NDArray[np.float64]
 
 _HINT = "install moderngl (pip install 'aerialdojo-gen[gl]') and Mesa (Debian: libegl1 libgl1 libgl1-mesa-dri)"
 
@@ -184,9 +183,8 @@ class GlRenderer(Renderer):
         return self.render_views(camera, [world_from_camera], instances)[0]
 
     def render_into(
-        self, camera: Camera, poses: Sequence[Floats], rgb: NDArray[np.uint8], depth_m: NDArray[np.float32],
-        instance: NDArray[np.int32] | None,
-    ) -> None:  # fmt: skip
+        self, camera: Camera, poses: Sequence[Floats], rgb: Bytes, depth_m: Singles, instance: Int32s | None
+    ) -> None:
         """Take pictures into arrays: neighbours that share their eye are culled together; see `Renderer`."""
         waiting: deque[tuple[Any, int]] = deque()
 

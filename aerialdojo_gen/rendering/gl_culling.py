@@ -14,10 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.base.kernels import njit
+from aerialdojo_gen.geometry.arrays import Flags, Floats, Ints, Singles
 from aerialdojo_gen.rendering.picture import NEAR_M
-
-Floats = NDArray[np.float64]
-Singles = NDArray[np.float32]
 
 # Triangles of a chunk: loops have that constant length for vectorisation.
 CHUNK_TRIANGLES = _SIZE = 96
@@ -32,9 +30,9 @@ _NEAREST = 1.0 / NEAR_M
 
 @njit(cache=True, error_model="numpy")
 def visible_triangles(
-    starts: NDArray[np.int64], low: Floats, high: Floats, planes: Floats, corners: Singles, hides: bool,
+    starts: Ints, low: Floats, high: Floats, planes: Floats, corners: Singles, hides: bool,
     clips: Floats, eye: Floats, nearness: Singles, out: NDArray[np.uint32],
-) -> NDArray[np.int64]:  # fmt: skip
+) -> Ints:  # fmt: skip
     """Write the indices of vertices that the views show into `out` (views, n), by chunk; return how many in each.
 
     Triangles are drawn into the views' inverse depths `nearness` (views, H, W) if they hide what is behind them.
@@ -75,9 +73,7 @@ def visible_triangles(
 
 
 @njit(cache=True)
-def _chunks_in_view(
-    low: Floats, high: Floats, eye: Floats, clips: Floats
-) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+def _chunks_in_view(low: Floats, high: Floats, eye: Floats, clips: Floats) -> tuple[Ints, Flags]:
     """Chunks in at least one view frustum, nearest first, and whether each is in each view, (m, v) bool."""
     in_view = _boxes_in_view(low, high, clips)
     found, away = np.empty(len(low), np.int64), np.empty(len(low), np.float64)
@@ -98,7 +94,7 @@ def _chunks_in_view(
 
 
 @njit(cache=True)
-def _boxes_in_view(low: Floats, high: Floats, clips: Floats) -> NDArray[np.bool_]:
+def _boxes_in_view(low: Floats, high: Floats, clips: Floats) -> Flags:
     out = np.ones((len(low), len(clips)), dtype=np.bool_)
     for v in range(len(clips)):
         w = clips[v, 3]
@@ -160,9 +156,7 @@ def _project(corners: Singles, m: Floats, width: int, height: int, places: Float
 
 
 @njit(cache=True)
-def _choose(
-    n: int, facing: Floats, places: Floats, width: int, height: int, boxes: Floats, kept: NDArray[np.int64]
-) -> int:  # fmt: skip
+def _choose(n: int, facing: Floats, places: Floats, width: int, height: int, boxes: Floats, kept: Ints) -> int:
     """Write which triangles face the eye and could cover a pixel's centre, without a branch; return how many.
 
     A triangle that reaches nearer than is projected is kept, one that lies there is not. The first and last column

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from aerialdojo_gen.geometry.arrays import Bytes
 from aerialdojo_gen.rendering.gl_geometry import Kind, cut, is_foreign, packed
 from aerialdojo_gen.rendering.shading import MUTE
 from aerialdojo_gen.scenes.model import HORIZON, Instance, Material, Part, Scene
@@ -72,7 +72,7 @@ def _size(material: Material) -> tuple[int, int]:
     return 1 << (height - 1).bit_length(), 1 << (width - 1).bit_length()
 
 
-def _layers(materials: list[Material], key: _Key) -> NDArray[np.uint8]:
+def _layers(materials: list[Material], key: _Key) -> Bytes:
     layers = np.empty((len(materials), key[0], key[1], 4 if key[2] else 3), dtype=np.uint8)
     for k, material in enumerate(materials):
         assert material.texture is not None

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.base.kernels import njit
+from aerialdojo_gen.geometry.arrays import Bytes, Floats, Ints, Singles
 from aerialdojo_gen.geometry.soup import soup
 from aerialdojo_gen.geometry.triangles import morton_codes
 from aerialdojo_gen.rendering.gl_culling import CHUNK_TRIANGLES, visible_triangles
@@ -25,10 +26,6 @@ from aerialdojo_gen.rendering.shading import MUTE, muted
 from aerialdojo_gen.scenes.model import HORIZON, Material, Part, Scene
 from aerialdojo_gen.scenes.noise import fractal, texture_rng
 from aerialdojo_gen.scenes.textures_natural import NATURAL
-
-Floats = NDArray[np.float64]
-Singles = NDArray[np.float32]
-Indices = NDArray[np.int64]
 
 _LARGEST_TEXTURE = 512
 _FINE = "FINE"  # Tag of what has a texture larger than most
@@ -57,7 +54,7 @@ class Chunks:
     """Triangles of one kind of surface (with a texture, or without), cut into chunks."""
 
     vertices: NDArray[np.void]  # (3 n,) structured array of `VERTEX`; n triangles, chunk after chunk
-    starts: NDArray[np.int64]  # (k + 1,) int64; first triangle of every chunk; the last is n
+    starts: Ints  # (k + 1,) int64; first triangle of every chunk; the last is n
     low: Floats  # (k, 3) float64; a chunk's box, metres, world frame
     high: Floats
     planes: Floats  # (k, 4 * 96) float64; a triangle faces the eye where ``normal . eye + d`` is positive
@@ -78,7 +75,7 @@ class Kind:
 
     chunks: Chunks
     tags: tuple[str, ...]  # Variant of the program (`aerialdojo_gen.rendering.gl_shaders.specialise`)
-    layers: NDArray[np.uint8] | None  # The layers of its texture array, first row at v = 0; None where it has none
+    layers: Bytes | None  # The layers of its texture array, first row at v = 0; None where it has none
     smooth: bool = False
     double_sided: bool = False  # Whether both sides are drawn
 
@@ -139,7 +136,7 @@ def _tags(material: Material) -> tuple[str, ...]:
     return (*tags, "SHINY") if is_shiny(material) else tags
 
 
-def smooth(rows: NDArray[np.void], group: Indices, creases: Floats) -> None:
+def smooth(rows: NDArray[np.void], group: Ints, creases: Floats) -> None:
     """Give corners the mean normal of the faces about them that turn less than a crease from their own, in place.
 
     Rows (n, 3) of `VERTEX` belong to groups (n,), each with its crease; a group ends at its own corners, and rows of
@@ -151,7 +148,7 @@ def smooth(rows: NDArray[np.void], group: Indices, creases: Floats) -> None:
 
 
 @njit(cache=True)
-def _mean_normals(points: NDArray[np.uint32], normal: Singles, group: Indices, creases: Floats) -> Singles:
+def _mean_normals(points: NDArray[np.uint32], normal: Singles, group: Ints, creases: Floats) -> Singles:
     """Mean normals (n, 3) of corners, by the bits of their points."""
     found = normal.copy()
     size = 1024
@@ -199,7 +196,7 @@ def is_foreign(part: Part, material: Material) -> bool:
     return material.foreign or part.colours is not None
 
 
-def packed(drawn: Sequence[tuple[Part, Material, int]]) -> tuple[NDArray[np.void], Indices]:
+def packed(drawn: Sequence[tuple[Part, Material, int]]) -> tuple[NDArray[np.void], Ints]:
     """Pack the triangles of parts that have an area, (n, 3) of `VERTEX`, and say which part each is of, (n,).
 
     Parts come with their material and the number of their instance; texel and layer are left at 0.
@@ -265,13 +262,13 @@ def _bases(names: list[str]) -> list[str]:
     return [name.split(":")[0] for name in names]
 
 
-def _layers(scene: Scene, names: list[str]) -> NDArray[np.uint8] | None:
+def _layers(scene: Scene, names: list[str]) -> Bytes | None:
     textures = [t for name in names if (t := scene.materials[name].texture) is not None]
     if not textures:
         return None
     largest = min(_LARGEST_TEXTURE, max(max(t.shape[:2]) for t in textures))
     edge = 1 << (largest - 1).bit_length()
-    layers: list[NDArray[np.uint8]] = []
+    layers: list[Bytes] = []
     for texture, base in zip(textures, _bases(names), strict=True):
         larger = max(texture.shape[:2]) > edge
         sized = cv2.resize(texture[::-1], (edge, edge), interpolation=cv2.INTER_AREA if larger else cv2.INTER_NEAREST)

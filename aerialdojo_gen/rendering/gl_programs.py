@@ -12,9 +12,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from aerialdojo_gen.geometry.arrays import Bytes, Floats, Int32s, Singles
 from aerialdojo_gen.rendering.gl_geometry import VERTEX
-
-Floats = NDArray[np.float64]
 
 # Read buffers per thread: allocating them costs more than reading.
 _thread = threading.local()
@@ -69,9 +68,7 @@ def clear_depth(target: Any, colours: int) -> None:
         target.color_mask = every if colours == 1 else (every,) * colours
 
 
-def read_pixels(
-    target: Any, rgb: NDArray[np.uint8], depth_m: NDArray[np.float32], instance: NDArray[np.int32] | None = None
-) -> None:
+def read_pixels(target: Any, rgb: Bytes, depth_m: Singles, instance: Int32s | None = None) -> None:
     """Read what was drawn: RGB (H, W, 3), planar depth (H, W), inf for no hit, instances (H, W), -1 for no hit."""
     shape = depth_m.shape
     if getattr(_thread, "shape", None) != shape:

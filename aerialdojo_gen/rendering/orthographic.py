@@ -6,16 +6,15 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from aerialdojo_gen.geometry.arrays import Bytes, Floats
 from aerialdojo_gen.geometry.rays import TriangleRayCaster
 from aerialdojo_gen.geometry.soup import soup
 from aerialdojo_gen.rendering.casters import triangle_caster
 from aerialdojo_gen.rendering.texels import SurfaceTexels, masked_caster
 from aerialdojo_gen.scenes.context import context_of
 from aerialdojo_gen.scenes.model import Material, Scene
-
-Floats = NDArray[np.float64]
 
 # A map's light, as shares of a colour: from everywhere, from above, from the sun's side, from the sun.
 _AMBIENT, _FROM_ABOVE, _FROM_SIDE, _SUN = 0.55, 0.11, 0.05, 0.47
@@ -66,11 +65,11 @@ class OrthographicPictures:
         self._floor_m, self._ceiling_m = float(vertices[:, 2].min()), float(vertices[:, 2].max())
         self._sky = sky + (np.array([236.0, 238.0, 240.0]) - sky) * 0.6
 
-    def from_above(self, extent_m: tuple[float, float, float, float], pixel_m: float) -> NDArray[np.uint8]:
+    def from_above(self, extent_m: tuple[float, float, float, float], pixel_m: float) -> Bytes:
         """Take a map of everything: `take` by a plane above the scene; west, east, south and north, metres."""
         return self.take(Plane.above(self._ceiling_m + 1.0, extent_m), pixel_m)
 
-    def take(self, plane: Plane, pixel_m: float) -> NDArray[np.uint8]:
+    def take(self, plane: Plane, pixel_m: float) -> Bytes:
         """Take a picture with pixels of `pixel_m` metres; (H, W, 3) uint8 sRGB, row 0 at the top."""
         left, right, bottom, top = plane.extent_m
         width, height = max(1, round((right - left) / pixel_m)), max(1, round((top - bottom) / pixel_m))
@@ -123,7 +122,7 @@ class OrthographicPictures:
         return lit
 
 
-def _downscaled(material: Material, pixel_m: float) -> NDArray[np.uint8] | None:
+def _downscaled(material: Material, pixel_m: float) -> Bytes | None:
     """The texture with texels no smaller than a pixel, so that sampling one of them is enough."""
     if material.texture is None:
         return None

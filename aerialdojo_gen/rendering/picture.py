@@ -9,8 +9,8 @@ from types import TracebackType
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from aerialdojo_gen.geometry.arrays import Bytes, Floats, Int32s, Singles
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.scenes.light import Light
 
@@ -22,9 +22,9 @@ NEAR_M, FAR_M = 0.1, 2000.0
 class Picture:
     """Output of a renderer for one camera."""
 
-    rgb: NDArray[np.uint8]  # (H, W, 3) uint8; sRGB
-    depth_m: NDArray[np.float32]  # (H, W) float32; planar depth, metres; inf where nothing is hit
-    instance: NDArray[np.int32] | None = None  # (H, W) int32 or None
+    rgb: Bytes  # (H, W, 3) uint8; sRGB
+    depth_m: Singles  # (H, W) float32; planar depth, metres; inf where nothing is hit
+    instance: Int32s | None = None  # (H, W) int32 or None
 
 
 class Renderer(ABC):
@@ -35,12 +35,10 @@ class Renderer(ABC):
     light: Light  # That it draws by: at first the scene's own
 
     @abstractmethod
-    def render(self, camera: Camera, world_from_camera: NDArray[np.float64], instances: bool = False) -> Picture:
+    def render(self, camera: Camera, world_from_camera: Floats, instances: bool = False) -> Picture:
         """Take a picture from a pose (4, 4); its arrays are not changed by later calls."""
 
-    def render_views(
-        self, camera: Camera, poses: Sequence[NDArray[np.float64]], instances: bool = False
-    ) -> list[Picture]:
+    def render_views(self, camera: Camera, poses: Sequence[Floats], instances: bool = False) -> list[Picture]:
         """Take several pictures; cheaper than one by one where neighbours share their eye."""
         shape = (len(poses), camera.height, camera.width)
         rgb, depth_m = np.empty((*shape, 3), np.uint8), np.empty(shape, np.float32)
@@ -49,9 +47,8 @@ class Renderer(ABC):
         return [Picture(rgb[k], depth_m[k], None if instance is None else instance[k]) for k in range(len(poses))]
 
     def render_bodies(
-        self, camera: Camera, poses: NDArray[np.float64], views: Sequence[str],
-        instance: NDArray[np.int32] | None = None,
-    ) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:  # fmt: skip
+        self, camera: Camera, poses: Floats, views: Sequence[str], instance: Int32s | None = None
+    ) -> tuple[Bytes, Singles]:
         """Take all views at poses (n, 4): RGB (n, views, H, W, 3) uint8 and planar depth, inf for no hit.
 
         Instance ids go into `instance` (n, views, H, W), if it is given.
@@ -64,9 +61,8 @@ class Renderer(ABC):
         return rgb, depth_m
 
     def render_into(
-        self, camera: Camera, poses: Sequence[NDArray[np.float64]], rgb: NDArray[np.uint8],
-        depth_m: NDArray[np.float32], instance: NDArray[np.int32] | None,
-    ) -> None:  # fmt: skip
+        self, camera: Camera, poses: Sequence[Floats], rgb: Bytes, depth_m: Singles, instance: Int32s | None
+    ) -> None:
         """Take pictures into arrays (n, H, W, 3) and (n, H, W)."""
         for k, pose in enumerate(poses):
             picture = self.render(camera, pose, instance is not None)

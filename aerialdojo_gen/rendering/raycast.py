@@ -9,9 +9,9 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aerialdojo_gen.base.kernels import njit
+from aerialdojo_gen.geometry.arrays import Bytes, Flags, Floats, Int32s, Ints, Singles
 from aerialdojo_gen.geometry.cameras import Camera
 from aerialdojo_gen.geometry.portable import product
 from aerialdojo_gen.geometry.rays import TriangleRayCaster
@@ -24,8 +24,6 @@ from aerialdojo_gen.scenes.context import context_of
 from aerialdojo_gen.scenes.light import Light
 from aerialdojo_gen.scenes.model import Scene
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int32]
 _WIDE_M = 4.0
 
 
@@ -42,7 +40,7 @@ class RayRenderer(Renderer):
         self._corners, self._uv = texels.vertices[texels.faces], texels.uv[texels.faces]
         # Instances that wide both ways are ground, roads, floors or roofs.
         bounds = np.array([instance.bounds for instance in scene.instances]).reshape(-1, 2, 3)
-        self.wide: NDArray[np.bool_] = (bounds[:, 1, :2] - bounds[:, 0, :2]).min(axis=1) > _WIDE_M
+        self.wide: Flags = (bounds[:, 1, :2] - bounds[:, 0, :2]).min(axis=1) > _WIDE_M
         self._rays = masked_caster(scene, caster or TriangleRayCaster(texels.vertices, texels.faces))
         self._vertex_colours = texels if texels.has_vertex_colours else None
         self._backdrop = Backdrop(scene)
@@ -95,9 +93,9 @@ def pixel_rays(camera: Camera) -> tuple[Floats, Floats]:
 
 @njit(cache=True, error_model="numpy")
 def _hit_attributes(
-    eye: Floats, directions: Floats, distance: Floats, length: Floats, face: Ints, corners: Floats, uv: Floats,
-    material: Ints, owner: Ints, tiles: NDArray[np.int64], texels: NDArray[np.uint8],
-) -> tuple[NDArray[np.uint8], NDArray[np.float32], Ints, Ints]:  # fmt: skip
+    eye: Floats, directions: Floats, distance: Floats, length: Floats, face: Int32s, corners: Floats, uv: Floats,
+    material: Int32s, owner: Int32s, tiles: Ints, texels: Bytes,
+) -> tuple[Bytes, Singles, Int32s, Int32s]:  # fmt: skip
     """Colour of the nearest texel, planar depth, material and instance of n ray hits."""
     rays = len(face)
     albedo, depth = np.zeros((rays, 3), np.uint8), np.full(rays, np.inf, np.float32)

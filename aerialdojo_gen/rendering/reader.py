@@ -14,12 +14,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from aerialdojo_gen.base.cli_context import command
 from aerialdojo_gen.base.errors import Malformed, RenderError
 from aerialdojo_gen.base.safe_parse import loads_json
+from aerialdojo_gen.geometry.arrays import Singles
 from aerialdojo_gen.rendering.codecs import SUFFIX, to_metres
 from aerialdojo_gen.rendering.placement import TILED
 from aerialdojo_gen.rendering.video import Frames, Tile, Video
@@ -51,7 +49,7 @@ class DepthVideo(Frames):
         """Return the number of frames."""
         return len(self.stored)
 
-    def _decode(self, k: int) -> NDArray[np.float32]:
+    def _decode(self, k: int) -> Singles:
         return to_metres(self.stored[k], self.step)
 
 

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from aerialdojo_gen.base.config.sections import RenderConfig
 from aerialdojo_gen.base.errors import RenderError
+from aerialdojo_gen.geometry.arrays import Bytes, Floats
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.rendering.checks import Solid, ViewChecks
 from aerialdojo_gen.rendering.codecs import PngWriter, VideoWriter, to_stored
@@ -22,8 +23,6 @@ from aerialdojo_gen.rendering.picture import Picture, Renderer
 from aerialdojo_gen.rendering.placement import TILED, Place, columns, modalities, places, tiled
 from aerialdojo_gen.rendering.trajectory import FramePoses, by_steps, by_time
 from aerialdojo_gen.rendering.video import Video
-
-Floats = NDArray[np.float64]
 
 
 def frame_poses(route: dict[str, Any], config: RenderConfig) -> FramePoses:
@@ -102,8 +101,8 @@ def _writer(folder: Path, place: Place, comments: dict[str, str], config: Render
     )
 
 
-def _encodable(picture: Picture, config: RenderConfig) -> dict[str, NDArray[np.uint8] | NDArray[np.uint16]]:
-    frames: dict[str, NDArray[np.uint8] | NDArray[np.uint16]] = {
+def _encodable(picture: Picture, config: RenderConfig) -> dict[str, Bytes | NDArray[np.uint16]]:
+    frames: dict[str, Bytes | NDArray[np.uint16]] = {
         "rgb": picture.rgb,
         "depth": to_stored(picture.depth_m, config.depth_step),
     }

@@ -9,8 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from aerialdojo_gen.geometry.arrays import Bytes, Flags, Floats, Ints
 from aerialdojo_gen.geometry.soup import soup
 from aerialdojo_gen.scenes.colours import texel
 from aerialdojo_gen.scenes.model import Material, Part, Scene
@@ -28,10 +28,10 @@ class Surface:
     """All triangles of one material."""
 
     material: str  # Name of the material
-    vertices: NDArray[np.float64]  # (n, 3) float64; metres, world frame
-    uv: NDArray[np.float64]  # (n, 2) float64; texture coordinates in tiles
-    faces: NDArray[np.int64]  # (m, 3) int64; indices into `vertices`
-    palette: NDArray[np.uint8] | None = None  # (h, w, 3) uint8 or None
+    vertices: Floats  # (n, 3) float64; metres, world frame
+    uv: Floats  # (n, 2) float64; texture coordinates in tiles
+    faces: Ints  # (m, 3) int64; indices into `vertices`
+    palette: Bytes | None = None  # (h, w, 3) uint8 or None
 
 
 def surfaces(scene: Scene) -> list[Surface]:
@@ -78,7 +78,7 @@ def _apply_material(surface: Surface, material: Material) -> Surface:
     return surface
 
 
-def _cut_holes(surface: Surface, mask: NDArray[np.bool_]) -> Surface:
+def _cut_holes(surface: Surface, mask: Flags) -> Surface:
     """Drop the masked-out pieces of subdivided triangles."""
     vertices, uv, faces = surface.vertices, surface.uv, surface.faces
     for _ in range(_HALVINGS):
@@ -94,7 +94,7 @@ def _cut_holes(surface: Surface, mask: NDArray[np.bool_]) -> Surface:
     return Surface(surface.material, vertices, uv, faces[opaque])
 
 
-def _drop_back_faces(surface: Surface, camera_box: NDArray[np.float64]) -> Surface:
+def _drop_back_faces(surface: Surface, camera_box: Floats) -> Surface:
     """Drop the triangles that face away from every point of a box, and those without an area."""
     corners = surface.vertices[surface.faces]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])

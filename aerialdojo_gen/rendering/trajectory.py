@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from aerialdojo_gen.geometry.arrays import Floats, Int32s
 from aerialdojo_gen.geometry.frames import wrap_angle_rad
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -17,7 +16,7 @@ class FramePoses:
     """Where the body is in every frame."""
 
     time_s: Floats  # (n,) float64; since the first frame
-    step: NDArray[np.int32]  # (n,) int32; the frame's trajectory pose: the last one reached
+    step: Int32s  # (n,) int32; the frame's trajectory pose: the last one reached
     action: NDArray[np.int8]  # (n,) int8; the action at that pose
     position: Floats  # (n, 3) float64; the body's centre, metres, world frame
     yaw_rad: Floats  # (n,) float64; in (-π, π] if interpolated, else as stored

@@ -9,11 +9,11 @@ from pathlib import Path
 from types import ModuleType
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aerialdojo_gen.base.errors import RenderError
 from aerialdojo_gen.base.kernels import njit
 from aerialdojo_gen.base.pictures import encode_png
+from aerialdojo_gen.geometry.arrays import Bytes, Floats, Int32s, Singles
 from aerialdojo_gen.geometry.cameras import Camera
 from aerialdojo_gen.geometry.portable import product
 from aerialdojo_gen.rendering.casters import ray_caster
@@ -52,7 +52,6 @@ def _import_silently() -> ModuleType:
 
 pybullet = _import_silently()
 
-Floats = NDArray[np.float64]
 
 # Steps by which a camera moves off a vertex in its own plane, and the gap that float32 needs, metres.
 _NUDGE_M, _GAP_M = 1.3e-4, 3e-5
@@ -145,7 +144,7 @@ class PyBulletRenderer(Renderer):
 
     def rasterise(
         self, camera: Camera, world_from_camera: Floats, near_m: float = NEAR_M, far_m: float = FAR_M
-    ) -> tuple[NDArray[np.uint8], NDArray[np.float32], NDArray[np.int32]]:
+    ) -> tuple[Bytes, Singles, Int32s]:
         """Rasterise without light: albedo (H, W, 3) uint8, planar depth (inf: no hit), surface number (-1: none)."""
         w, h = camera.width, camera.height
         projection = _projection(camera, near_m, far_m)

@@ -9,7 +9,8 @@ import shapely
 from shapely.geometry import LinearRing, Polygon
 
 from aerialdojo_gen.base.simplex import OpenSimplex
-from aerialdojo_gen.geometry.portable import Floats, unit
+from aerialdojo_gen.geometry.arrays import Floats
+from aerialdojo_gen.geometry.portable import unit
 from aerialdojo_gen.scenes.site import Site
 
 
