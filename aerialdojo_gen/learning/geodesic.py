@@ -11,8 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from aerialdojo_gen.base.constants import RADIUS_M
 from aerialdojo_gen.benchmark.agents.goal import N_ACTIONS
 from aerialdojo_gen.geometry.motion import DISPLACEMENTS
-from aerialdojo_gen.planning.attempt import costs_at
-from aerialdojo_gen.planning.cost_to_go import cost_to_go
+from aerialdojo_gen.planning.cost_to_go import cost_to_go, costs_at
 from aerialdojo_gen.planning.flight_space import FlightSpace, flight_space
 from aerialdojo_gen.scenes.context import context_of
 

@@ -93,6 +93,13 @@ def cost_to_go(
     return cost
 
 
+@njit(cache=True, inline="always")
+def _cells_about(place: float, reach: float, origin: float, cell: float, n: int) -> tuple[int, int]:
+    """First cell and end of those whose centres lie within reach along an axis of n cells."""
+    first = math.ceil((place - reach - origin) / cell - 0.5)
+    return max(0, first), min(n - 1, math.floor((place + reach - origin) / cell - 0.5)) + 1
+
+
 @njit(cache=True)
 def seed_goal(
     gx: float, gy: float, gz: float, yaw: float, reach: float, radius: float,
@@ -102,21 +109,12 @@ def seed_goal(
     nx, ny, nz = cost.shape
     found = np.empty(4096, np.int32)
     n = 0
-    i0, i1 = (
-        math.ceil((gx - reach - grid.origin[0]) / grid.cell - 0.5),
-        (gx + reach - grid.origin[0]) / grid.cell - 0.5,
-    )
-    j0, j1 = (
-        math.ceil((gy - reach - grid.origin[1]) / grid.cell - 0.5),
-        (gy + reach - grid.origin[1]) / grid.cell - 0.5,
-    )
-    k0, k1 = (
-        math.ceil((gz - reach - grid.origin[2]) / grid.cell - 0.5),
-        (gz + reach - grid.origin[2]) / grid.cell - 0.5,
-    )
-    for i in range(max(0, i0), min(nx - 1, math.floor(i1)) + 1):
-        for j in range(max(0, j0), min(ny - 1, math.floor(j1)) + 1):
-            for k in range(max(0, k0), min(nz - 1, math.floor(k1)) + 1):
+    i0, i1 = _cells_about(gx, reach, grid.origin[0], grid.cell, nx)
+    j0, j1 = _cells_about(gy, reach, grid.origin[1], grid.cell, ny)
+    k0, k1 = _cells_about(gz, reach, grid.origin[2], grid.cell, nz)
+    for i in range(i0, i1):
+        for j in range(j0, j1):
+            for k in range(k0, k1):
                 if moves[i, j, k] == 0 or n == found.shape[0]:
                     continue
                 x, y, z = cell_centre(i, j, k, grid)
@@ -310,3 +308,26 @@ def cost_between(x: float, y: float, z: float, ox: float, oy: float, oz: float, 
         min(min(a + r00 + s, b + r00 + t), min(c + r01 + s, d + r01 + t)),
         min(min(e + r10 + s, f + r10 + t), min(g + r11 + s, h + r11 + t)),
     )
+
+
+@njit(cache=True)
+def lengths_at(
+    points: Floats, goal: Floats, grid: GridArrays, moves: NDArray[np.uint32], cost: Singles, clearance_cost: Singles
+) -> Floats:
+    """Lengths of the cheapest grid paths from points, (n, 3) float64 metres; (n,) float64 metres."""
+    values = np.empty(len(points))
+    for i in range(len(points)):
+        x, y, z = points[i, 0], points[i, 1], points[i, 2]
+        values[i] = cost_at(x, y, z, grid, cost)
+        if values[i] < np.inf:
+            values[i] -= extra_cost(x, y, z, goal, grid, moves, cost, clearance_cost)
+    return values
+
+
+@njit(cache=True)
+def costs_at(points: Floats, grid: GridArrays, cost: Singles) -> Floats:
+    """Cost-to-go of points, (n, 3) float64 metres; (n,) float64 metres."""
+    values = np.empty(len(points))
+    for i in range(len(points)):
+        values[i] = cost_at(points[i, 0], points[i, 1], points[i, 2], grid, cost)
+    return values

@@ -15,12 +15,12 @@ from aerialdojo_gen.base.config.sections import PlanConfig, SearchAttempt
 from aerialdojo_gen.base.constants import RADIUS_M
 from aerialdojo_gen.geometry.arrays import Floats, Int32s, Singles
 from aerialdojo_gen.geometry.motion import TURN_RAD, nearest_heading
-from aerialdojo_gen.planning.attempt import costs_at, lengths_at, plan_once
+from aerialdojo_gen.planning.attempt import plan_once
 from aerialdojo_gen.planning.certify import certify
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.collision import collision_world
 from aerialdojo_gen.planning.column_lanes import MIN_CELLS
-from aerialdojo_gen.planning.cost_to_go import cost_to_go, seed_goal
+from aerialdojo_gen.planning.cost_to_go import cost_to_go, costs_at, lengths_at, seed_goal
 from aerialdojo_gen.planning.field_cache import FieldCache
 from aerialdojo_gen.planning.hybrid_astar import EXHAUSTED, FOUND, SearchArrays, SearchOptions, make_search_arrays
 from aerialdojo_gen.planning.preference import Preference, clearance_cost_field

@@ -8,6 +8,7 @@ none. All writers give the same bytes for the same frames.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager
 from fractions import Fraction
 from functools import lru_cache
 from pathlib import Path
@@ -79,7 +80,7 @@ def _steps(step: float) -> NDArray[np.uint16]:
     return values
 
 
-class VideoWriter:
+class VideoWriter(AbstractContextManager["VideoWriter"]):
     """Write video streams (H.264 RGB, 16-bit depth, instance ids) into one file, by frames; a context manager."""
 
     def __init__(
@@ -117,10 +118,6 @@ class VideoWriter:
             for packet in stream.encode():
                 self._container.mux(packet)
         self._container.close()
-
-    def __enter__(self) -> VideoWriter:
-        """Return itself."""
-        return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
@@ -183,7 +180,7 @@ def _to_yuv(rgba: Int32s, y: Bytes, u: Bytes, v: Bytes) -> None:
 
 
 class PngWriter:
-    """Write frames as loose PNG files, ``000000.png`` and on; a context manager."""
+    """Write frames as loose PNG files, ``000000.png`` and on."""
 
     def __init__(self, folder: Path, modality: str, comment: str = "") -> None:
         self._folder, self._modality, self._n = folder, modality, 0
@@ -194,12 +191,3 @@ class PngWriter:
         """Append the modality's frame: (H, W, 3) uint8 RGB, or (H, W) uint16."""
         (self._folder / f"{self._n:06}.png").write_bytes(encode_png(frames[self._modality], FRAME_PNG))
         self._n += 1
-
-    def __enter__(self) -> PngWriter:
-        """Return itself."""
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """Do nothing: every frame is a file of its own."""

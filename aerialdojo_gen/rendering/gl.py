@@ -21,8 +21,7 @@ from aerialdojo_gen.geometry.arrays import Bytes, Floats, Int32s, Singles
 from aerialdojo_gen.geometry.cameras import Camera
 from aerialdojo_gen.rendering import gl_programs
 from aerialdojo_gen.rendering import gl_shaders as glsl
-from aerialdojo_gen.rendering.gl_foreign import backdrop_kinds, foreign_kinds
-from aerialdojo_gen.rendering.gl_geometry import Kind, own_kinds
+from aerialdojo_gen.rendering.gl_geometry import Kind, backdrop_kinds, foreign_kinds, own_kinds
 from aerialdojo_gen.rendering.gl_programs import clear_depth, read_pixels
 from aerialdojo_gen.rendering.lighting import cloud_map, height_map, light_of, sun_view
 from aerialdojo_gen.rendering.picture import FAR_M, NEAR_M, Picture, Renderer

@@ -7,8 +7,8 @@ so that hidden ones fail the depth test early.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache, reduce
 from typing import Any
 
@@ -23,7 +23,7 @@ from aerialdojo_gen.geometry.triangles import morton_codes
 from aerialdojo_gen.rendering.gl_culling import CHUNK_TRIANGLES, visible_triangles
 from aerialdojo_gen.rendering.lighting import is_fine, is_shiny, texel_m
 from aerialdojo_gen.rendering.shading import MUTE, muted
-from aerialdojo_gen.scenes.model import HORIZON, Material, Part, Scene
+from aerialdojo_gen.scenes.model import HORIZON, Instance, Material, Part, Scene
 from aerialdojo_gen.scenes.noise import fractal, texture_rng
 from aerialdojo_gen.scenes.textures_natural import NATURAL
 
@@ -192,7 +192,7 @@ def _mean_normals(points: NDArray[np.uint32], normal: Singles, group: Ints, crea
 
 
 def is_foreign(part: Part, material: Material) -> bool:
-    """Whether a part is drawn by `aerialdojo_gen.rendering.gl_foreign`."""
+    """Whether a part is drawn as one of an imported mesh."""
     return material.foreign or part.colours is not None
 
 
@@ -284,3 +284,78 @@ def _layers(scene: Scene, names: list[str]) -> Bytes | None:
 def _grain(edge: int) -> Floats:
     """Noise without a scale, tileable: what a material shows from afar, where its own pattern would be too large."""
     return fractal(edge, 6, 6, texture_rng("grain"), 0.75)
+
+
+# Fourth byte of the vertex colour of an unlit material.
+_UNLIT = 255
+_Key = tuple[int, int, bool, bool]
+
+
+def foreign_kinds(scene: Scene) -> list[Kind]:
+    """Pack the triangles that `own_kinds` leaves out."""
+    return _foreign(scene.instances, scene.materials, True, ("FOREIGN",))
+
+
+def backdrop_kinds(scene: Scene) -> list[Kind]:
+    """Pack sky domes: all materials, both sides."""
+    domes = [instance for instance in scene.backdrop if instance.surface != HORIZON]
+    # No light falls on a dome: its colours stay as vivid as they are.
+    unlit = {name: replace(material, unlit=True) for name, material in scene.materials.items()}
+    return _foreign(domes, unlit, False, ("FOREIGN", "BACKDROP"))
+
+
+def _foreign(
+    instances: Iterable[Instance], materials: dict[str, Material], foreign_only: bool, tags: tuple[str, ...]
+) -> list[Kind]:
+    drawn: dict[_Key, list[tuple[Part, Material, int]]] = {}
+    for k, instance in enumerate(instances):
+        for part in instance.parts:
+            material = materials[part.material]
+            if not foreign_only or is_foreign(part, material):
+                double_sided = material.double_sided or not foreign_only
+                key = (*_size(material), material.mask is not None, double_sided)
+                drawn.setdefault(key, []).append((part, material, k))
+    kinds = (_kind(key, drawn[key], tags) for key in sorted(drawn))
+    return [kind for kind in kinds if kind is not None]
+
+
+def _kind(key: _Key, drawn: list[tuple[Part, Material, int]], tags: tuple[str, ...]) -> Kind | None:
+    rows, part_of = packed(drawn)
+    if not len(rows):
+        return None
+    layer = {material.name: material for _, material, _ in drawn if material.texture is not None}
+    number = {name: k for k, name in enumerate(layer)}
+    unlit = np.array([_UNLIT if material.unlit else 0 for _, material, _ in drawn])
+    rows["colour"][..., 3] = unlit[part_of, None]
+    rows["layer"] = np.array([number.get(material.name, 0) for _, material, _ in drawn])[part_of, None]
+    return Kind(
+        cut(rows, double_sided=key[3]),
+        (*tags, *(("ATLAS",) if key[0] else ()), *(("MASK",) if key[2] else ())),
+        _foreign_layers(list(layer.values()), key) if key[0] else None,
+        smooth=True,
+        double_sided=key[3],
+    )
+
+
+def _size(material: Material) -> tuple[int, int]:
+    """Height and width of the layer that a texture gets: powers of two, so that few sizes serve all."""
+    if material.texture is None:
+        return 0, 0
+    height, width = material.texture.shape[:2]
+    return 1 << (height - 1).bit_length(), 1 << (width - 1).bit_length()
+
+
+def _foreign_layers(materials: list[Material], key: _Key) -> Bytes:
+    layers = np.empty((len(materials), key[0], key[1], 4 if key[2] else 3), dtype=np.uint8)
+    for k, material in enumerate(materials):
+        assert material.texture is not None
+        texture = material.texture if material.unlit else cv2.transform(material.texture, MUTE)
+        if material.mask is not None:
+            alpha = np.where(material.mask, 255, 0).astype(np.uint8)
+            # Fill holes with the mean colour, or filtering would give leaves dark edges.
+            filled = np.where(material.mask[..., None], texture, np.array(material.colour, dtype=np.uint8))
+            texture = np.dstack([filled, alpha])
+        if texture.shape[:2] != key[:2]:
+            texture = cv2.resize(texture, (key[1], key[0]), interpolation=cv2.INTER_LINEAR)
+        layers[k] = texture[::-1]
+    return layers

@@ -11,8 +11,7 @@ from numpy.typing import ArrayLike
 from aerialdojo_gen.geometry.arrays import Bytes, Floats
 from aerialdojo_gen.geometry.rays import TriangleRayCaster
 from aerialdojo_gen.geometry.soup import soup
-from aerialdojo_gen.rendering.casters import triangle_caster
-from aerialdojo_gen.rendering.texels import SurfaceTexels, masked_caster
+from aerialdojo_gen.rendering.texels import masked_caster, scene_texels
 from aerialdojo_gen.scenes.context import context_of
 from aerialdojo_gen.scenes.model import Material, Scene
 
@@ -51,11 +50,10 @@ class Plane:
 class OrthographicPictures:
     """Takes parallel projections of a scene."""
 
-    def __init__(self, scene: Scene, caster: TriangleRayCaster | None = None) -> None:
-        parts = [part for instance in scene.instances for part in instance.parts]
-        self._texels = SurfaceTexels(parts, scene.materials)
+    def __init__(self, scene: Scene) -> None:
+        self._texels = scene_texels(scene)
         vertices, materials = self._texels.vertices, self._texels.materials
-        self._rays = masked_caster(scene, caster or TriangleRayCaster(vertices, self._texels.faces))
+        self._rays = masked_caster(scene)
         self._double_sided = np.array([m.double_sided for m in materials])[self._texels.material]
         self._unlit = np.array([m.unlit for m in materials])[self._texels.material]
         self._sun = np.array(scene.sun, dtype=np.float64) / np.linalg.norm(scene.sun)
@@ -135,6 +133,4 @@ def _downscaled(material: Material, pixel_m: float) -> Bytes | None:
 
 def orthographic_pictures(scene: Scene) -> OrthographicPictures:
     """Return the orthographic camera of the scene's context, over its one Embree scene."""
-    return context_of(scene).part(
-        "orthographic pictures", lambda: OrthographicPictures(scene, triangle_caster(scene))
-    )
+    return context_of(scene).part("orthographic pictures", lambda: OrthographicPictures(scene))

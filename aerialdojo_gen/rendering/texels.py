@@ -38,7 +38,10 @@ class SurfaceTexels:
         self.uv = np.concatenate([part.uv for part in parts]).astype(np.float64)
         self.has_vertex_colours = any(part.colours is not None for part in parts)
         if self.has_vertex_colours:
-            self._colours = np.concatenate([_vertex_colours(p, materials[p.material]) for p in parts])
+            means = (np.tile(np.array(materials[p.material].colour, np.uint8), (len(p.vertices), 1)) for p in parts)
+            self._colours = np.concatenate(
+                [mean if p.colours is None else p.colours for p, mean in zip(parts, means, strict=True)]
+            )
             self._is_coloured = np.repeat([part.colours is not None for part in parts], counts)
 
     def barycentric(self, face: Int32s, points: Floats) -> Floats:
@@ -100,12 +103,6 @@ class SurfaceTexels:
         return np.asarray(share[:, :1] * uv[:, 0] + share[:, 1:2] * uv[:, 1] + share[:, 2:] * uv[:, 2])
 
 
-def _vertex_colours(part: Part, material: Material) -> Bytes:
-    if part.colours is not None:
-        return part.colours
-    return np.tile(np.array(material.colour, dtype=np.uint8), (len(part.vertices), 1))
-
-
 class MaskedRayCaster:
     """Casts rays through the masked-out parts of textures."""
 
@@ -141,9 +138,9 @@ def scene_texels(scene: Scene) -> SurfaceTexels:
     return context_of(scene).part("texels", lambda: SurfaceTexels(parts, scene.materials))
 
 
-def masked_caster(scene: Scene, caster: TriangleRayCaster | None = None) -> TriangleRayCaster | MaskedRayCaster:
-    """Return a ray caster that respects alpha masks; the plain one if the scene has none."""
-    whole = caster or triangle_caster(scene)
+def masked_caster(scene: Scene) -> TriangleRayCaster | MaskedRayCaster:
+    """Return the scene's ray caster that respects alpha masks; the plain one if the scene has none."""
+    whole = triangle_caster(scene)
     if all(material.mask is None for material in scene.materials.values()):
         return whole
     return MaskedRayCaster(whole, scene_texels(scene))

@@ -5,10 +5,9 @@ from scipy.sparse.csgraph import dijkstra
 from support.flying import town
 from support.handmade import box, instance, scene
 
-from aerialdojo_gen.planning.attempt import lengths_at
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.connectivity import MOVES, move_lengths
-from aerialdojo_gen.planning.cost_to_go import cost_at, expand_cost, seed_goal
+from aerialdojo_gen.planning.cost_to_go import cost_at, expand_cost, lengths_at, seed_goal
 from aerialdojo_gen.planning.preference import NO_PREFERENCE, Preference, clearance_cost_field
 
 

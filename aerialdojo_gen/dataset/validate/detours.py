@@ -20,10 +20,9 @@ from aerialdojo_gen.base.config.sections import SearchAttempt
 from aerialdojo_gen.base.kernels import njit
 from aerialdojo_gen.dataset.validate.registry import Finding, check
 from aerialdojo_gen.dataset.validate.rows import Floats, Rows, SceneData
-from aerialdojo_gen.planning.attempt import costs_at
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.collision import CollisionWorld
-from aerialdojo_gen.planning.cost_to_go import cost_to_go
+from aerialdojo_gen.planning.cost_to_go import cost_to_go, costs_at
 from aerialdojo_gen.planning.planner import Planner
 from aerialdojo_gen.planning.preference import approach_penalty, clearance_penalty
 from aerialdojo_gen.store.schemas import APPROACH
