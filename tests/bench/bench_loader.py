@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable
 from tempfile import TemporaryDirectory
 
 import numpy as np
+from common import best_ms
 
 from aerialdojo_gen import GlRenderer, make_env
 from aerialdojo_gen.benchmark.observations import renderer_for
@@ -27,16 +27,6 @@ from aerialdojo_gen.store.root import open_root
 from aerialdojo_gen.store.schemas import VIEWS
 
 SAMPLES = 48
-
-
-def best_ms(work: Callable[[], object], times: int = 3) -> float:
-    """CPU milliseconds of the best of some runs."""
-    found = []
-    for _ in range(times):
-        begun = time.process_time()
-        work()
-        found.append(time.process_time() - begun)
-    return 1e3 * min(found)
 
 
 def scene_rows(data: str, scene: str) -> None:
