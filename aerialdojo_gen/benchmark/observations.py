@@ -16,7 +16,6 @@ from aerialdojo_gen.base.errors import RenderError
 from aerialdojo_gen.benchmark.agents.goal import Goal, Sensors
 from aerialdojo_gen.planning.flight_space import Point
 from aerialdojo_gen.rendering.backend import choose_renderer, scene_renderer
-from aerialdojo_gen.rendering.bodies import draw_bodies
 from aerialdojo_gen.rendering.picture import Renderer
 from aerialdojo_gen.scenes.light import Light
 from aerialdojo_gen.scenes.model import Scene
@@ -87,7 +86,7 @@ def render_views(
     if sensors.blind:
         return rgb, depth_m
     pose = np.array([[*position, yaw_rad]])
-    pictures, depths = draw_bodies(renderer_for(scene, renderer, light), sensors.camera, pose, sensors.views)
+    pictures, depths = renderer_for(scene, renderer, light).render_bodies(sensors.camera, pose, sensors.views)
     for v, view in enumerate(sensors.views):
         if sensors.rgb:
             rgb[view] = pictures[0, v]

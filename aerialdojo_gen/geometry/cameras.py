@@ -15,12 +15,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from aerialdojo_gen.base.constants import FOV_DEG
+from aerialdojo_gen.geometry.arrays import Floats
 from aerialdojo_gen.geometry.portable import norm, product
-
-Floats = NDArray[np.float64]
 
 # Columns are the camera's x, y and z axes in the body frame (x forward, y left, z up).
 _BODY_FROM_CAMERA = {

@@ -6,12 +6,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aerialdojo_gen.base.kernels import njit
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from aerialdojo_gen.geometry.arrays import Flags, Floats, Ints
 
 # Where in its cell a column stands: not on the edges and diagonals that meshes on round coordinates have.
 _CELL_OFFSET = (0.4371, 0.5573)
@@ -35,7 +32,7 @@ class Plan(NamedTuple):
         nx, ny = (max(1, math.ceil(v / step_m)) for v in (high - low))
         return cls(np.asarray(low, np.float64), step_m, (nx, ny))
 
-    def places(self, chosen: NDArray[np.bool_]) -> Floats:
+    def places(self, chosen: Flags) -> Floats:
         """Places in plan of columns that are marked in a (nx, ny) array, (n, 2) float64, metres."""
         return self.low + (np.argwhere(chosen) + np.array(_CELL_OFFSET)) * self.step_m
 
@@ -98,18 +95,18 @@ class ColumnIndex(NamedTuple):
 
 
 @njit(cache=True, inline="always")
-def _height(x: float, y: float, t: Floats, k: int) -> float:
-    """Height of triangle k above a point of the plan; NaN beside it, and for one that stands upright."""
+def plumb_height(x: float, y: float, t: Floats, k: int) -> tuple[float, float]:
+    """Height of triangle k above a point of the plan, NaN beside it and for one that stands upright; doubled area."""
     ax, ay = t[k, 0] - x, t[k, 1] - y
     bx, by = t[k, 3] - x, t[k, 4] - y
     cx, cy = t[k, 6] - x, t[k, 7] - y
     u, v, w = bx * cy - by * cx, cx * ay - cy * ax, ax * by - ay * bx
     if not ((u >= 0.0 and v >= 0.0 and w >= 0.0) or (u <= 0.0 and v <= 0.0 and w <= 0.0)):
-        return np.nan
+        return np.nan, 0.0
     area = u + v + w
     if area == 0.0:
-        return np.nan
-    return (u * t[k, 2] + v * t[k, 5] + w * t[k, 8]) / area
+        return np.nan, 0.0
+    return (u * t[k, 2] + v * t[k, 5] + w * t[k, 8]) / area, area
 
 
 @njit(cache=True, inline="always")
@@ -124,7 +121,7 @@ def _span(a: float, b: float, c: float, plan: Plan, axis: int) -> tuple[int, int
 def _height_in(plan: Plan, i: int, j: int, t: Floats, k: int) -> float:
     """Height of triangle k in a column of a plan."""
     x = plan.low[0] + (i + _CELL_OFFSET[0]) * plan.step_m
-    return _height(x, plan.low[1] + (j + _CELL_OFFSET[1]) * plan.step_m, t, k)
+    return plumb_height(x, plan.low[1] + (j + _CELL_OFFSET[1]) * plan.step_m, t, k)[0]
 
 
 @njit(cache=True)
@@ -180,7 +177,7 @@ def _fill(t: Floats, low: Floats, edge: float, shape: tuple[int, int], place: In
 
 
 @njit(cache=True, inline="always")
-def _over(x: float, y: float, index: ColumnIndex) -> NDArray[np.int64]:
+def _over(x: float, y: float, index: ColumnIndex) -> Ints:
     """Triangles of the square of a point in plan; none outside of the squares."""
     # Below 0 int() rounds up, and a NaN has no place at all.
     if not (x >= index.low[0] and y >= index.low[1]):
@@ -198,7 +195,7 @@ def _lowest_at(xy: Floats, index: ColumnIndex) -> Floats:
     for p in range(len(xy)):
         best = np.inf
         for k in _over(xy[p, 0], xy[p, 1], index):
-            z = _height(xy[p, 0], xy[p, 1], index.triangles, k)
+            z = plumb_height(xy[p, 0], xy[p, 1], index.triangles, k)[0]
             if z < best:
                 best = z
         if best < np.inf:
@@ -215,7 +212,7 @@ def _layers_at(points: Floats, index: ColumnIndex) -> tuple[Ints, Floats, Floats
         over = _over(x, y, index)
         heights = np.empty(len(over))
         for m in range(len(over)):
-            heights[m] = _height(x, y, index.triangles, over[m])
+            heights[m] = plumb_height(x, y, index.triangles, over[m])[0]
         last = -np.inf
         for h in np.sort(heights[~np.isnan(heights)]):
             # An edge that two triangles share is met twice.
@@ -236,7 +233,7 @@ def _gaps_below(points: Floats, own: int, owner: Ints, deep: float, index: Colum
         for k in _over(x, y, index):
             if owner[k] == own:
                 continue
-            h = _height(x, y, t, k)
+            h = plumb_height(x, y, t, k)[0]
             if h <= z:
                 out[p] = min(out[p], z - h)
             elif h - z <= deep:

@@ -8,12 +8,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from aerialdojo_gen.base.constants import DIRECTIONS
+from aerialdojo_gen.geometry.arrays import Floats
 from aerialdojo_gen.geometry.portable import atan2
-
-Floats = NDArray[np.float64]
 
 
 def compass_direction(dx_m: float, dy_m: float) -> str:

@@ -12,13 +12,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from aerialdojo_gen.geometry.arrays import Flags, Floats, Ints
 from aerialdojo_gen.geometry.columns import ColumnIndex, Plan, lowest_of, shares_of
 from aerialdojo_gen.geometry.soup import SceneLike
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 # Columns that decide what is ground are this far apart.
 _COLUMN_M = 0.5
@@ -106,7 +104,7 @@ class Ground:
         """Height of the lowest ground at points in plan, (n, 2) float; (n,) float64, metres, NaN where is none."""
         return self._columns.lowest_m(np.asarray(xy, np.float64).reshape(-1, 2))
 
-    def below(self, points: ArrayLike) -> NDArray[np.bool_]:
+    def below(self, points: ArrayLike) -> Flags:
         """Whether points (n, 3), world metres, lie below ground: a plumb line meets ground above and none below."""
         p = np.asarray(points, np.float64).reshape(-1, 3)
         # A comparison with NaN is False: where there is no ground nothing lies below it.
@@ -185,7 +183,7 @@ def _bodies(faces: Ints, n: int) -> Ints:
     return body.reshape(-1).astype(np.int64)
 
 
-def _edges(faces: Ints) -> tuple[Ints, NDArray[np.bool_]]:
+def _edges(faces: Ints) -> tuple[Ints, Flags]:
     """Edges of faces, (3 n, 2), lower corner first, edge k of all faces before edge k + 1; and which are single."""
     edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
     _, same, count = np.unique(
@@ -194,7 +192,7 @@ def _edges(faces: Ints) -> tuple[Ints, NDArray[np.bool_]]:
     return edges, count[same.reshape(-1)] == 1
 
 
-def _has_rim(faces: Ints, body: Ints, n: int) -> NDArray[np.bool_]:
+def _has_rim(faces: Ints, body: Ints, n: int) -> Flags:
     _, single = _edges(faces)
     return np.bincount(np.tile(body, 3), single, n) > 0
 

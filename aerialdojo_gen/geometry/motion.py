@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from aerialdojo_gen.base.constants import ACTION_NAMES, APPROACH, STOP, TURN_LEFT, TURN_RIGHT
 from aerialdojo_gen.base.kernels import njit
+from aerialdojo_gen.geometry.arrays import Floats, Ints
 from aerialdojo_gen.geometry.frames import wrap_one_rad
 
 N_HEADINGS = 24
@@ -41,7 +42,7 @@ TURNS = np.array([(a == TURN_LEFT) - (a == TURN_RIGHT) for a in range(len(ACTION
 _wrapped = njit(cache=True, inline="always")(wrap_one_rad)
 
 
-def replay(start: ArrayLike, actions: ArrayLike) -> NDArray[np.float64]:
+def replay(start: ArrayLike, actions: ArrayLike) -> Floats:
     """Replay actions (n,) from a start pose (world) without collisions: poses (n + 1, 4), yaw in (-π, π]."""
     a = np.asarray(actions, np.int64).reshape(-1)
     if ((a < STOP) | (a > APPROACH)).any():
@@ -50,7 +51,7 @@ def replay(start: ArrayLike, actions: ArrayLike) -> NDArray[np.float64]:
 
 
 @njit(cache=True)
-def fly(start: NDArray[np.float64], actions: NDArray[np.int8]) -> NDArray[np.float64]:
+def fly(start: Floats, actions: NDArray[np.int8]) -> Floats:
     """`replay` for kernels: (4,) float64 and (n,) int8 that are known to be actions, to (n + 1, 4) float64."""
     poses = np.empty((len(actions) + 1, 4))
     poses[0] = start
@@ -68,7 +69,7 @@ def fly(start: NDArray[np.float64], actions: NDArray[np.int8]) -> NDArray[np.flo
     return poses
 
 
-def route_length_m(points: NDArray[np.float64]) -> float:
+def route_length_m(points: Floats) -> float:
     """Length of a polyline, (n, 3) float64 metres: the paper's L, in which yaw adds nothing."""
     return float(np.sqrt((np.diff(points, axis=0) ** 2).sum(axis=1)).sum())
 
@@ -78,7 +79,7 @@ def nearest_heading(start_yaw: float, yaw: float) -> int:
     return round((yaw - start_yaw) / TURN_RAD) % N_HEADINGS
 
 
-def sampled(points: NDArray[np.float64], step_m: float = 0.5) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def sampled(points: Floats, step_m: float = 0.5) -> tuple[Floats, Ints]:
     """Points along a polyline, at most `step_m` metres apart, corners included, and the segment of each."""
     pieces, owners = [], []
     for k in range(len(points) - 1):

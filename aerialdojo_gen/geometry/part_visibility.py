@@ -7,14 +7,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from aerialdojo_gen.geometry.arrays import Flags, Floats
 from aerialdojo_gen.geometry.frames import wrap_angle_rad
 from aerialdojo_gen.geometry.portable import atan2, dot, norm
 from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.geometry.surface import Surface
-
-Floats = NDArray[np.float64]
 
 # Within it an object counts as seen from its front: a step in the marks, which a little more light must not outweigh.
 FRONT_RAD = math.radians(60.0)
@@ -23,7 +22,7 @@ _SHADE = 0.8
 _OFF_SURFACE_M = 2e-3
 
 
-def in_picture(positions: Floats, yaw_rad: Floats, points: Floats, fov_deg: float) -> NDArray[np.bool_]:
+def in_picture(positions: Floats, yaw_rad: Floats, points: Floats, fov_deg: float) -> Flags:
     """Whether points (m, 3) lie in the front camera's picture from n poses, whatever hides them; (n, m) bool."""
     ray = points[None] - positions[:, None]
     cos, sin = np.cos(yaw_rad)[:, None], np.sin(yaw_rad)[:, None]
@@ -46,7 +45,7 @@ class Patch:
 
     points: Floats  # (m, 3) float64; metres, world frame
     normals: Floats  # (m, 3) float64; unit vectors; the side that they point to has no meaning
-    lit: NDArray[np.bool_]  # Whether the sun reaches the side that the normal points to, and the other one
+    lit: Flags  # Whether the sun reaches the side that the normal points to, and the other one
     area_m2: float  # Of the part's faces, each counted from one side
 
     @classmethod

@@ -9,11 +9,11 @@ one variant for processors with FMA, which is in all since 2013, and one for old
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from aerialdojo_gen.base.kernels import njit
+from aerialdojo_gen.geometry.arrays import Floats
 
-Floats = NDArray[np.float64]
 UP = np.array([0.0, 0.0, 1.0])
 
 

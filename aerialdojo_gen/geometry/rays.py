@@ -7,14 +7,11 @@ from functools import cached_property
 import numpy as np
 from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from aerialdojo_gen.base.kernels import njit
+from aerialdojo_gen.geometry.arrays import Flags, Floats, Int32s, Ints, Singles
 from aerialdojo_gen.geometry.soup import Body, SceneLike, soup
-
-Floats = NDArray[np.float64]
-Singles = NDArray[np.float32]
-Ints = NDArray[np.int32]
 
 
 @njit(cache=True)
@@ -34,8 +31,8 @@ def _rays(origins: Floats, directions: Floats, centre: Floats) -> tuple[Floats, 
 
 @njit(cache=True)
 def _hits(
-    which: Ints, rough: Singles, origins: Floats, unit: Floats, corner: Floats, normal: Floats, faces: Ints
-) -> tuple[Floats, Ints]:
+    which: Int32s, rough: Singles, origins: Floats, unit: Floats, corner: Floats, normal: Floats, faces: Int32s
+) -> tuple[Floats, Int32s]:
     """Distances along rays from the planes of the triangles that they hit, and the faces that these are."""
     n = len(which)
     distance, face = np.full(n, np.inf), np.full(n, -1, np.int32)
@@ -57,8 +54,8 @@ def _hits(
 
 @njit(cache=True, error_model="numpy")
 def _towards(
-    origins: Floats, points: Floats, row: Ints, column: Ints, centre: Floats, least_m: float
-) -> tuple[NDArray[np.int64], Floats, Floats, Singles, Singles]:
+    origins: Floats, points: Floats, row: Int32s, column: Int32s, centre: Floats, least_m: float
+) -> tuple[Ints, Floats, Floats, Singles, Singles]:
     """Rays between rows of origins and points beyond `least_m`: which, lengths, directions, and Embree's input."""
     n, k = len(row), 0
     which, length = np.empty(n, np.int64), np.empty(n)
@@ -85,7 +82,7 @@ class TriangleRayCaster:
     about 0.02 mm, which decides only which of two triangles a ray at their very edge takes.
     """
 
-    def __init__(self, vertices: Floats, faces: NDArray[np.int32]) -> None:
+    def __init__(self, vertices: Floats, faces: Int32s) -> None:
         triangles = np.asarray(vertices, dtype=np.float64)[faces]
         # A hit's distance comes from its triangle's plane: a sliver without a normal has none.
         normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
@@ -108,7 +105,7 @@ class TriangleRayCaster:
         length = np.linalg.norm(self._normals, axis=1, keepdims=True)
         return self._corners, self._normals / np.where(length > 0.0, length, 1.0)
 
-    def first_hit(self, origins: ArrayLike, directions: ArrayLike) -> tuple[Floats, Ints]:
+    def first_hit(self, origins: ArrayLike, directions: ArrayLike) -> tuple[Floats, Int32s]:
         """First hit along rays, (n, 3) world metres: distance (inf for none) and face (-1 for none), (n,) each."""
         d = np.asarray(directions, dtype=np.float64)
         if not len(d):
@@ -120,8 +117,12 @@ class TriangleRayCaster:
         return distance, face
 
     def unobstructed(
-        self, origins: ArrayLike, points: ArrayLike, tolerance_m: float = 5e-3, ends: tuple[Ints, Ints] | None = None
-    ) -> NDArray[np.bool_]:
+        self,
+        origins: ArrayLike,
+        points: ArrayLike,
+        tolerance_m: float = 5e-3,
+        ends: tuple[Int32s, Int32s] | None = None,
+    ) -> Flags:
         """Whether segments from origins to points, (n, 3) world metres, are free but for the last `tolerance_m`.
 
         (n,) bool. `ends` names the rows of origins and points that each segment joins, where these are not in pairs.
@@ -141,7 +142,7 @@ class TriangleRayCaster:
 
     def first_between(
         self, origins: ArrayLike, points: ArrayLike, least_m: float
-    ) -> tuple[NDArray[np.int64], Floats, Floats, Ints]:
+    ) -> tuple[Ints, Floats, Floats, Int32s]:
         """First hit towards points further than `least_m`: which (k,), and length, distance and face of the hit."""
         o, p, row = _pairs(origins, points)
         far, length, unit, start, aim = _towards(o, p, row, row, self._centre, least_m)
@@ -152,7 +153,7 @@ class TriangleRayCaster:
         return far, length, *_hits(hit["primID"], hit["tfar"], origin, unit, self._corner, self._normal, self._face)
 
 
-def _pairs(origins: ArrayLike, points: ArrayLike) -> tuple[Floats, Floats, Ints]:
+def _pairs(origins: ArrayLike, points: ArrayLike) -> tuple[Floats, Floats, Int32s]:
     o, p = np.broadcast_arrays(np.asarray(origins, dtype=np.float64), np.asarray(points, dtype=np.float64))
     o, p = np.ascontiguousarray(np.atleast_2d(o)), np.ascontiguousarray(np.atleast_2d(p))
     return o, p, np.arange(len(p), dtype=np.int32)
@@ -166,14 +167,18 @@ class RayCaster:
         self._owner = np.repeat(np.arange(len(self.nodes), dtype=np.int32), [len(i.faces) for i in scene.instances])
         self._triangles = triangles or TriangleRayCaster(*soup(scene.instances))
 
-    def first_hit(self, origins: ArrayLike, directions: ArrayLike) -> tuple[Floats, Ints]:
+    def first_hit(self, origins: ArrayLike, directions: ArrayLike) -> tuple[Floats, Int32s]:
         """First hit along rays, world metres: distance (n,) and index of the instance (-1 for none)."""
         distance, face = self._triangles.first_hit(origins, directions)
         return distance, np.where(face >= 0, self._owner[face], np.int32(-1))
 
     def visible(
-        self, origins: ArrayLike, points: ArrayLike, own_instance: int | Ints | None = None, tolerance_m: float = 5e-3
-    ) -> NDArray[np.bool_]:
+        self,
+        origins: ArrayLike,
+        points: ArrayLike,
+        own_instance: int | Int32s | None = None,
+        tolerance_m: float = 5e-3,
+    ) -> Flags:
         """Whether points (n, 3) are seen from origins: nothing is hit before the point but its own instance."""
         shape = np.broadcast_shapes(np.shape(origins), np.shape(points))
         seen = np.ones(1 if len(shape) == 1 else shape[0], dtype=np.bool_)

@@ -8,12 +8,14 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from aerialdojo_gen.geometry.arrays import Floats, Int32s
+
 
 class Body(Protocol):
     """What has triangles: an instance, a part of one."""
 
     @property
-    def vertices(self) -> NDArray[np.float64]:
+    def vertices(self) -> Floats:
         """(n, 3) float64, metres."""
 
     @property
@@ -29,7 +31,7 @@ class InstanceLike(Body, Protocol):
         """Name, unique among the things."""
 
     @property
-    def bounds(self) -> NDArray[np.float64]:
+    def bounds(self) -> Floats:
         """Axis-aligned box, (2, 3) float64, metres, world frame: lower corner, upper corner."""
 
     @property
@@ -45,11 +47,11 @@ class SceneLike(Protocol):
         """In a stable order."""
 
     @property
-    def bounds(self) -> NDArray[np.float64]:
+    def bounds(self) -> Floats:
         """Flight volume, (2, 3) float64, metres, world frame: lower corner, upper corner."""
 
 
-def soup(bodies: Sequence[Body]) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+def soup(bodies: Sequence[Body]) -> tuple[Floats, Int32s]:
     """Concatenate the triangles of bodies, none welded: vertices (n, 3) metres and faces (m, 3)."""
     offsets = np.cumsum([0, *(len(body.vertices) for body in bodies[:-1])])
     faces = [body.faces.astype(np.int32) + np.int32(k) for body, k in zip(bodies, offsets, strict=True)]

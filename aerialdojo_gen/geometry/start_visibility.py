@@ -9,13 +9,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from aerialdojo_gen.base.constants import VIEWS
 from aerialdojo_gen.base.kernels import njit
+from aerialdojo_gen.geometry.arrays import Flags, Floats, Int32s, Ints
 from aerialdojo_gen.geometry.rays import TriangleRayCaster
 from aerialdojo_gen.geometry.triangles import morton_codes
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int32]
 Codes = NDArray[np.int8]
-Flags = NDArray[np.bool_]
 
 # So many rays a pose find triangles that hide the target; most of the others meet one of these too.
 _PROBES = 16
@@ -109,7 +107,7 @@ def _hidden(planes: Floats, x: float, y: float, z: float, radius: float, length:
 
 @njit(cache=True)
 def _uncovered(
-    points: Floats, balls: Floats, ranges: Ints, poses: Floats, faces: Ints, triangles: Floats, normals: Floats
+    points: Floats, balls: Floats, ranges: Int32s, poses: Floats, faces: Int32s, triangles: Floats, normals: Floats
 ) -> Flags:
     """Points that no triangle among the pose's faces (n, p) surely hides: (n, m) bool."""
     n, m = len(poses), len(points)
@@ -157,7 +155,7 @@ def _uncovered(
 
 
 @njit(cache=True)
-def _in_view(points: Floats, poses: Floats, uncovered: Flags) -> tuple[Ints, Ints, Codes]:
+def _in_view(points: Floats, poses: Floats, uncovered: Flags) -> tuple[Int32s, Int32s, Codes]:
     """Poses and points of a mask (n, m) that a view holds, and by which view."""
     n, m = uncovered.shape
     row, column, view, count = np.empty(n * m, np.int32), np.empty(n * m, np.int32), np.empty(n * m, np.int8), 0
@@ -174,7 +172,7 @@ def _in_view(points: Floats, poses: Floats, uncovered: Flags) -> tuple[Ints, Int
 
 
 @lru_cache(maxsize=4)
-def _ranges(n: int) -> Ints:
+def _ranges(n: int) -> Int32s:
     """First and end of each part of n points that is tested together, and the next range outside it; (k, 3)."""
     rows: list[list[int]] = []
 
@@ -195,7 +193,7 @@ def _ranges(n: int) -> Ints:
 
 
 @njit(cache=True)
-def _balls(points: Floats, ranges: Ints) -> Floats:
+def _balls(points: Floats, ranges: Int32s) -> Floats:
     """Centre and radius of a ball around each range of points, (k, 4)."""
     out = np.zeros((len(ranges), 4))
     for b in range(len(ranges)):
@@ -210,7 +208,7 @@ def _balls(points: Floats, ranges: Ints) -> Floats:
 
 def start_visibility(
     scene: TriangleRayCaster, own: TriangleRayCaster, points: ArrayLike, poses: ArrayLike
-) -> tuple[Floats, NDArray[np.int64]]:
+) -> tuple[Floats, Ints]:
     """Share of an object's points (m, 3) seen from each pose (n, 4), and the view that sees most (-1 for none)."""
     p, q = np.asarray(points, dtype=np.float64), np.asarray(poses, dtype=np.float64)
     p = p[np.argsort(morton_codes(p, 10), kind="stable")]

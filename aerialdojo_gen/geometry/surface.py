@@ -7,14 +7,13 @@ a tree would cost more to build than all of its queries. Whole scenes are `aeria
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from aerialdojo_gen.base.kernels import njit
+from aerialdojo_gen.geometry.arrays import Floats, Int32s, Ints
 from aerialdojo_gen.geometry.portable import dot
 from aerialdojo_gen.geometry.soup import Body
 from aerialdojo_gen.geometry.triangles import closest_point_d2
-
-Floats = NDArray[np.float64]
 
 _LEAST_AREA_M2 = 1e-12
 
@@ -37,7 +36,7 @@ def _distance(p: Floats, triangles: Floats, spheres: Floats, guess: int) -> tupl
 
 
 @njit(cache=True)
-def _distances(points: Floats, triangles: Floats, spheres: Floats) -> tuple[Floats, NDArray[np.int64]]:
+def _distances(points: Floats, triangles: Floats, spheres: Floats) -> tuple[Floats, Ints]:
     out = np.empty(len(points))
     which = np.empty(len(points), dtype=np.int64)
     nearest = 0
@@ -74,7 +73,7 @@ def _march(
 class Surface:
     """The surface of one mesh."""
 
-    def __init__(self, vertices: Floats, faces: NDArray[np.int32]) -> None:
+    def __init__(self, vertices: Floats, faces: Int32s) -> None:
         corners = np.asarray(vertices, dtype=np.float64)[faces]
         edges = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         self.areas_m2: Floats = np.linalg.norm(edges, axis=1) / 2.0

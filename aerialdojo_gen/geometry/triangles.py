@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.base.kernels import njit
+from aerialdojo_gen.geometry.arrays import Flags, Floats, Ints
 
 _PARALLEL = 1e-14
 
@@ -30,7 +31,7 @@ def point_segment_d2(
 
 
 @njit(cache=True)
-def point_triangle_d2(px: float, py: float, pz: float, tri: NDArray[np.float64], k: int) -> float:
+def point_triangle_d2(px: float, py: float, pz: float, tri: Floats, k: int) -> float:
     """Squared distance from point p to triangle `tri[k]`; right for degenerate triangles too."""
     ax, ay, az = tri[k, 0], tri[k, 1], tri[k, 2]
     bx, by, bz = tri[k, 3], tri[k, 4], tri[k, 5]
@@ -53,7 +54,7 @@ def point_triangle_d2(px: float, py: float, pz: float, tri: NDArray[np.float64],
 
 
 @njit(cache=True)
-def closest_point_d2(p: NDArray[np.float64], t: NDArray[np.float64]) -> float:
+def closest_point_d2(p: Floats, t: Floats) -> float:
     """Squared distance from point p, (3,), to the triangle t, (9,), by its closest point (Ericson, 5.1.5).
 
     Not `point_triangle_d2`, which differs from it in the last bits: the distances that anchors are stored with are
@@ -129,9 +130,8 @@ def segment_segment_d2(
 
 @njit(cache=True)
 def segment_triangle_d2(
-    px: float, py: float, pz: float, qx: float, qy: float, qz: float,
-    tri: NDArray[np.float64], k: int, bound: float,
-) -> float:  # fmt: skip
+    px: float, py: float, pz: float, qx: float, qy: float, qz: float, tri: Floats, k: int, bound: float
+) -> float:
     """Squared distance between segment pq and triangle `tri[k]`, metres²; inf where it exceeds `bound` squared."""
     ax, ay, az = tri[k, 0], tri[k, 1], tri[k, 2]
     bx, by, bz = tri[k, 3], tri[k, 4], tri[k, 5]
@@ -163,9 +163,7 @@ def segment_triangle_d2(
     return d if d <= limit else np.inf
 
 
-def split_triangles(
-    triangles: NDArray[np.float64], max_edge_m: float, lower: NDArray[np.float64], upper: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def split_triangles(triangles: Floats, max_edge_m: float, lower: Floats, upper: Floats) -> tuple[Floats, Ints]:
     """Halve triangles (n, 9) until no edge exceeds `max_edge_m`, dropping those outside a box: pieces, their rows."""
     todo = triangles.reshape(-1, 3, 3)
     near, small = _within(triangles, lower, upper, max_edge_m)
@@ -196,15 +194,13 @@ def split_triangles(
     return np.concatenate(done).reshape(-1, 9), np.concatenate(whose)
 
 
-def _edges(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
+def _edges(triangles: Floats) -> Floats:
     """Lengths of the edges of triangles (n, 3, 3), each from its own corner: (n, 3)."""
     return np.asarray(np.linalg.norm(triangles - np.roll(triangles, -1, axis=1), axis=2))
 
 
 @njit(cache=True)
-def _within(
-    triangles: NDArray[np.float64], lower: NDArray[np.float64], upper: NDArray[np.float64], longest: float
-) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+def _within(triangles: Floats, lower: Floats, upper: Floats, longest: float) -> tuple[Flags, Flags]:
     """Which triangles have a box that touches a box, and which a box so small that no edge of theirs is longer."""
     near, small = np.ones(len(triangles), np.bool_), np.empty(len(triangles), np.bool_)
     for n in range(len(triangles)):
@@ -219,9 +215,7 @@ def _within(
 
 
 @njit(cache=True)
-def _interleaved(
-    points: NDArray[np.float64], low: NDArray[np.float64], extent: float, most: int
-) -> NDArray[np.uint64]:
+def _interleaved(points: Floats, low: Floats, extent: float, most: int) -> NDArray[np.uint64]:
     out = np.empty(len(points), np.uint64)
     for n in range(len(points)):
         code = np.uint64(0)
@@ -238,7 +232,7 @@ def _interleaved(
     return out
 
 
-def morton_codes(points: NDArray[np.float64], bits: int = 21) -> NDArray[np.uint64]:
+def morton_codes(points: Floats, bits: int = 21) -> NDArray[np.uint64]:
     """Morton codes (n,) uint64 of points (n, 3) in their bounding cube, `bits` (at most 21) a coordinate."""
     low = points.min(axis=0)
     extent = max(float((points.max(axis=0) - low).max()), 1e-9)

@@ -7,13 +7,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
-from numpy.typing import NDArray
 
+from aerialdojo_gen.geometry.arrays import Flags, Floats, Ints
 from aerialdojo_gen.geometry.frames import wrap_angle_rad
 from aerialdojo_gen.geometry.rays import RayCaster, TriangleRayCaster
 from aerialdojo_gen.geometry.surface import Surface
-
-Floats = NDArray[np.float64]
 
 _LEAST_POINTS = 3
 _FULL_SIZE = 0.5
@@ -66,9 +64,9 @@ class PointVisibility:
 
     u: Floats  # Where the points are in the picture: -1 to 1 from edge to edge; meaningless behind the camera
     v: Floats
-    roomy: NDArray[np.bool_]  # (n, m) bool; points within the picture with a little room, whatever hides them
-    facing: NDArray[np.bool_]  # (n, m) bool; points in the picture that the object itself does not hide
-    seen: NDArray[np.bool_]  # (n, m) bool; those of them that nothing else hides either
+    roomy: Flags  # (n, m) bool; points within the picture with a little room, whatever hides them
+    facing: Flags  # (n, m) bool; points in the picture that the object itself does not hide
+    seen: Flags  # (n, m) bool; those of them that nothing else hides either
 
     @classmethod
     def of(
@@ -92,9 +90,7 @@ class PointVisibility:
         seen[pose, point] = scene.visible(positions[pose], points[point], own_instance)
         return cls(u, v, in_front & (np.abs(u) <= _ROOM) & (np.abs(v) <= _ROOM), facing, seen)
 
-    def with_rows(
-        self, rows: NDArray[np.int64], where: NDArray[np.int64], others: PointVisibility
-    ) -> PointVisibility:
+    def with_rows(self, rows: Ints, where: Ints, others: PointVisibility) -> PointVisibility:
         """Take some viewpoints, (k,), and put others in the place of those of them that `where` says."""
         taken = {field.name: getattr(self, field.name)[rows] for field in fields(self)}
         for name, values in taken.items():
@@ -149,8 +145,8 @@ def level_marks(elevation_deg: Floats | float) -> Floats:
 
 
 def shortlist(
-    score: Floats, azimuth_rad: Floats, count: int, separation_rad: float, required: NDArray[np.bool_] | None = None
-) -> NDArray[np.int64]:
+    score: Floats, azimuth_rad: Floats, count: int, separation_rad: float, required: Flags | None = None
+) -> Ints:
     """Choose greedily the best scores at least `separation_rad` apart in azimuth: indices, highest score first."""
     chosen: list[int] = []
     separation = np.full(len(score), math.inf)

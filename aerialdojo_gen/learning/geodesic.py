@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from functools import lru_cache
 from pathlib import Path
 
@@ -12,10 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from aerialdojo_gen.base.constants import RADIUS_M
 from aerialdojo_gen.benchmark.agents.goal import N_ACTIONS
 from aerialdojo_gen.geometry.motion import DISPLACEMENTS
-from aerialdojo_gen.planning.attempt import costs_at
-from aerialdojo_gen.planning.cost_to_go import columns_by_distance, expand_cost, seed_goal
+from aerialdojo_gen.planning.cost_to_go import cost_to_go, costs_at
 from aerialdojo_gen.planning.flight_space import FlightSpace, flight_space
-from aerialdojo_gen.planning.preference import NO_PREFERENCE
 from aerialdojo_gen.scenes.context import context_of
 
 Floats = NDArray[np.float64]
@@ -49,8 +46,6 @@ class Geodesic:
 
     def __init__(self, space: FlightSpace) -> None:
         self._space, self._grid = space, space.grid
-        self._plain = np.zeros(self._grid.moves.shape, np.float32)
-        self._order = columns_by_distance(math.ceil((_FARTHEST_M + 2 * _REACH_M) / self._grid.arrays.cell))
         self._field = lru_cache(maxsize=_KEPT)(self._make_field)
 
     def distances_m(self, goal: ArrayLike, points: ArrayLike) -> Floats:
@@ -66,11 +61,7 @@ class Geodesic:
         return collides, refused, np.where(collides, np.inf, cost)
 
     def _make_field(self, *goal: float) -> NDArray[np.float32]:
-        grid = self._grid
-        cost = np.full(grid.moves.shape, np.inf, np.float32)
-        seeds = seed_goal(*goal, 0.0, _REACH_M, grid.radius_m, grid.arrays, grid.moves, cost, NO_PREFERENCE)
-        expand_cost(seeds, self._order, _FARTHEST_M, grid.arrays.cell, grid.moves, cost, self._plain)
-        return cost
+        return cost_to_go(np.array([*goal, 0.0]), self._grid, _REACH_M, _FARTHEST_M, _FARTHEST_M + 2 * _REACH_M)
 
 
 def geodesic(mesh: Path, sha256: str, radius_m: float = RADIUS_M) -> Geodesic:

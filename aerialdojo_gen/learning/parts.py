@@ -21,7 +21,6 @@ from aerialdojo_gen.learning.labels import odometry, to_body_frame
 from aerialdojo_gen.learning.steps import Steps
 from aerialdojo_gen.learning.words import goal_text
 from aerialdojo_gen.planning.flight_space import flight_space
-from aerialdojo_gen.rendering.bodies import draw_bodies
 from aerialdojo_gen.scenes.context import SEVERAL, open_scene
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import DataRoot
@@ -110,7 +109,7 @@ def pictures(
     for k in range(0, len(poses), 512):
         own = out[k : k + 512]
         instance = None if on_instances is None else np.empty(own.shape[:-1], np.int32)
-        rgb, depth_m = draw_bodies(renderer, s.camera, poses[k : k + 512], s.views, instance)
+        rgb, depth_m = renderer.render_bodies(s.camera, poses[k : k + 512], s.views, instance)
         own[:] = packed(rgb, clip_depth(depth_m, s), s)
         if on_instances is not None and instance is not None:
             on_instances(k, instance)

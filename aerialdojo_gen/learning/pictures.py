@@ -30,7 +30,6 @@ from aerialdojo_gen.benchmark.observations import clip_depth, renderer_for, rend
 from aerialdojo_gen.benchmark.tasks import mesh_of
 from aerialdojo_gen.learning.index import Index
 from aerialdojo_gen.pipeline.code_digest import code_of
-from aerialdojo_gen.rendering.bodies import draw_bodies
 from aerialdojo_gen.rendering.reader import Recording, read_recording
 from aerialdojo_gen.scenes.context import SEVERAL, open_scene
 from aerialdojo_gen.store import shards as store
@@ -217,7 +216,7 @@ class RenderedFrames:
         context = open_scene(*mesh_of(*index.scene_of(int(trajectories[0]))), SEVERAL)
         poses = {int(k): index.poses_of(int(k)) for k in np.unique(trajectories)}
         at = np.stack([poses[k][s] for k, s in zip(trajectories.tolist(), steps.tolist(), strict=True)])
-        rgb, depth_m = draw_bodies(renderer_for(context.scene, self._renderer), sensors.camera, at, sensors.views)
+        rgb, depth_m = renderer_for(context.scene, self._renderer).render_bodies(sensors.camera, at, sensors.views)
         seen = {"rgb": rgb} if sensors.rgb else {}
         return seen | ({"depth_m": clip_depth(depth_m, sensors)} if sensors.depth else {})
 

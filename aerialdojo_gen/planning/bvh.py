@@ -8,18 +8,17 @@ middle of its longest axis: a query visits half the nodes of a tree along a Mort
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aerialdojo_gen.base.kernels import njit
+from aerialdojo_gen.geometry.arrays import Floats, Ints
+from aerialdojo_gen.geometry.columns import plumb_height
 from aerialdojo_gen.geometry.triangles import point_triangle_d2, segment_triangle_d2
 
 LEAF = 4
 _STACK = 64
 
 
-def build_bvh(
-    triangles: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+def build_bvh(triangles: Floats) -> tuple[Floats, Floats, Ints]:
     """Sort triangles (n, 9) into a tree: sorted triangles, node boxes (2 m, 6; row 0 unused) and the order."""
     leaves = 1
     while leaves * LEAF < len(triangles):
@@ -30,7 +29,7 @@ def build_bvh(
 
 
 @njit(cache=True)
-def _split_at_medians(centres: NDArray[np.float64], leaves: int) -> NDArray[np.int64]:
+def _split_at_medians(centres: Floats, leaves: int) -> Ints:
     """Order of the triangles with these centres (n, 3) in a tree of so many leaves; all but the last are full."""
     order = np.arange(len(centres))
     stack = np.empty((_STACK, 3), np.int64)
@@ -51,7 +50,7 @@ def _split_at_medians(centres: NDArray[np.float64], leaves: int) -> NDArray[np.i
 
 
 @njit(cache=True)
-def _longest_axis(rows: NDArray[np.int64], centres: NDArray[np.float64]) -> int:
+def _longest_axis(rows: Ints, centres: Floats) -> int:
     """Axis along which some centres lie furthest apart."""
     best, longest = 0, -1.0
     for axis in range(3):
@@ -64,7 +63,7 @@ def _longest_axis(rows: NDArray[np.int64], centres: NDArray[np.float64]) -> int:
 
 
 @njit(cache=True)
-def _partition(order: NDArray[np.int64], keys: NDArray[np.float64], first: int, last: int, middle: int) -> None:
+def _partition(order: Ints, keys: Floats, first: int, last: int, middle: int) -> None:
     """Put the smallest keys of a range of `order` before `middle`, and the others from there on (quickselect)."""
     last -= 1
     while first < last:
@@ -88,7 +87,7 @@ def _partition(order: NDArray[np.int64], keys: NDArray[np.float64], first: int, 
 
 
 @njit(cache=True)
-def _node_boxes(triangles: NDArray[np.float64], leaves: int) -> NDArray[np.float64]:
+def _node_boxes(triangles: Floats, leaves: int) -> Floats:
     """Boxes of the tree's nodes, leaves last."""
     boxes = np.empty((2 * leaves, 6))
     boxes[:, :3], boxes[:, 3:] = np.inf, -np.inf
@@ -106,9 +105,7 @@ def _node_boxes(triangles: NDArray[np.float64], leaves: int) -> NDArray[np.float
 
 
 @njit(cache=True, inline="always")
-def _box_gap2(
-    lx: float, ly: float, lz: float, hx: float, hy: float, hz: float, boxes: NDArray[np.float64], node: int
-) -> float:
+def _box_gap2(lx: float, ly: float, lz: float, hx: float, hy: float, hz: float, boxes: Floats, node: int) -> float:
     """Squared distance between the box (l, h) and a node's box."""
     gx = max(0.0, max(boxes[node, 0] - hx, lx - boxes[node, 3]))
     gy = max(0.0, max(boxes[node, 1] - hy, ly - boxes[node, 4]))
@@ -118,10 +115,10 @@ def _box_gap2(
 
 @njit(cache=True)
 def segment_distance(
-    px: float, py: float, pz: float, qx: float, qy: float, qz: float,
-    bound: float, tri: NDArray[np.float64], boxes: NDArray[np.float64],
-) -> float:  # fmt: skip
-    """Distance from the segment pq to the nearest triangle, or `bound` where that is less; metres."""
+    px: float, py: float, pz: float, qx: float, qy: float, qz: float, bound: float, tri: Floats, boxes: Floats
+) -> float:
+    """Distance from the segment pq, or a point, to the nearest triangle, or `bound` where that is less; metres."""
+    is_point = px == qx and py == qy and pz == qz
     lx, ly, lz = min(px, qx), min(py, qy), min(pz, qz)
     hx, hy, hz = max(px, qx), max(py, qy), max(pz, qz)
     leaves = boxes.shape[0] // 2
@@ -145,13 +142,15 @@ def segment_distance(
             continue
         first = (node - leaves) * LEAF
         for k in range(first, min(first + LEAF, tri.shape[0])):
-            d2 = segment_triangle_d2(px, py, pz, qx, qy, qz, tri, k, np.sqrt(best2))
-            best2 = min(best2, d2)
+            if is_point:
+                best2 = min(best2, point_triangle_d2(px, py, pz, tri, k))
+            else:
+                best2 = min(best2, segment_triangle_d2(px, py, pz, qx, qy, qz, tri, k, np.sqrt(best2)))
     return np.sqrt(best2)
 
 
 @njit(cache=True)
-def crossings_above(px: float, py: float, pz: float, tri: NDArray[np.float64], boxes: NDArray[np.float64]) -> int:
+def crossings_above(px: float, py: float, pz: float, tri: Floats, boxes: Floats) -> int:
     """Surfaces crossed straight up from p, outward +1, inward -1.
 
     Positive inside a solid or below an upward surface.
@@ -177,61 +176,17 @@ def crossings_above(px: float, py: float, pz: float, tri: NDArray[np.float64], b
             continue
         first = (node - leaves) * LEAF
         for k in range(first, min(first + LEAF, tri.shape[0])):
-            count += _crossing(px, py, pz, tri, k)
+            height, area = plumb_height(px, py, tri, k)
+            if height > pz:
+                count += 1 if area > 0.0 else -1
     return count
 
 
 @njit(cache=True)
-def _crossing(px: float, py: float, pz: float, tri: NDArray[np.float64], k: int) -> int:
-    ax, ay = tri[k, 0] - px, tri[k, 1] - py
-    bx, by = tri[k, 3] - px, tri[k, 4] - py
-    cx, cy = tri[k, 6] - px, tri[k, 7] - py
-    u, v, w = bx * cy - by * cx, cx * ay - cy * ax, ax * by - ay * bx
-    if not ((u >= 0.0 and v >= 0.0 and w >= 0.0) or (u <= 0.0 and v <= 0.0 and w <= 0.0)):
-        return 0
-    area = u + v + w
-    if area == 0.0:
-        return 0
-    if (u * tri[k, 2] + v * tri[k, 5] + w * tri[k, 8]) / area <= pz:
-        return 0
-    return 1 if area > 0.0 else -1
-
-
-@njit(cache=True)
-def point_distance(
-    px: float, py: float, pz: float, bound: float, tri: NDArray[np.float64], boxes: NDArray[np.float64]
-) -> float:
-    """Distance from p to the nearest triangle, or `bound` where that is less; metres."""
-    leaves = boxes.shape[0] // 2
-    best2 = bound * bound
-    stack = np.empty(_STACK, np.int64)
-    stack[0] = 1
-    top = 1
-    while top > 0:
-        top -= 1
-        node = stack[top]
-        if _box_gap2(px, py, pz, px, py, pz, boxes, node) >= best2:
-            continue
-        if node < leaves:
-            left, right = 2 * node, 2 * node + 1
-            gl = _box_gap2(px, py, pz, px, py, pz, boxes, left)
-            gr = _box_gap2(px, py, pz, px, py, pz, boxes, right)
-            stack[top] = right if gl <= gr else left
-            stack[top + 1] = left if gl <= gr else right
-            top += 2
-            continue
-        first = (node - leaves) * LEAF
-        for k in range(first, min(first + LEAF, tri.shape[0])):
-            best2 = min(best2, point_triangle_d2(px, py, pz, tri, k))
-    return np.sqrt(best2)
-
-
-@njit(cache=True)
-def point_distances(
-    points: NDArray[np.float64], bound: float, tri: NDArray[np.float64], boxes: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """`point_distance` of points, (n, 3) float64 metres."""
+def point_distances(points: Floats, bound: float, tri: Floats, boxes: Floats) -> Floats:
+    """Distances of points, (n, 3) float64 metres, to the nearest triangle, or `bound` where that is less; metres."""
     out = np.empty(len(points))
     for n in range(len(points)):
-        out[n] = point_distance(points[n, 0], points[n, 1], points[n, 2], bound, tri, boxes)
+        x, y, z = points[n, 0], points[n, 1], points[n, 2]
+        out[n] = segment_distance(x, y, z, x, y, z, bound, tri, boxes)
     return out

@@ -13,9 +13,9 @@ import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
-from numpy.typing import NDArray
 
 from aerialdojo_gen.base.kernels import njit
+from aerialdojo_gen.geometry.arrays import Floats, Singles
 from aerialdojo_gen.geometry.triangles import segment_triangle_d2
 from aerialdojo_gen.planning.bvh import LEAF
 from aerialdojo_gen.planning.vectors import constant, data_of, floats, load, splat
@@ -29,7 +29,7 @@ _SHORT_M, _STEEP = 1e-3, 1e30
 _LOWEST_BIT = np.array([0] + [(k & -k).bit_length() - 1 for k in range(1, 1 << _WIDTH)], np.int64)
 
 
-def group_boxes(boxes: NDArray[np.float64]) -> NDArray[np.float32]:
+def group_boxes(boxes: Floats) -> Singles:
     """Boxes of the descendants three levels below every node, (n, 6, 8) float32 metres; lower x, y, z, upper ones."""
     groups = boxes[: len(boxes) // _WIDTH * _WIDTH].reshape(-1, _WIDTH, 6).transpose(0, 2, 1).astype(np.float32)
     away = np.array([-np.inf] * 3 + [np.inf] * 3, np.float32)
@@ -80,9 +80,8 @@ def _along(p: float, d: float, radius: float) -> tuple[np.float32, np.float32, n
 
 @njit(cache=True, error_model="numpy")
 def segment_blocker(
-    px: float, py: float, pz: float, qx: float, qy: float, qz: float,
-    radius: float, tri: NDArray[np.float64], groups: NDArray[np.float32],
-) -> int:  # fmt: skip
+    px: float, py: float, pz: float, qx: float, qy: float, qz: float, radius: float, tri: Floats, groups: Singles
+) -> int:
     """Row of a triangle that lies within `radius` of the segment pq, -1 if there is none.
 
     `groups` are those of the tree whose sorted triangles are `tri`.

@@ -9,9 +9,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aerialdojo_gen.base.kernels import njit
+from aerialdojo_gen.geometry.arrays import Flags, Floats
 from aerialdojo_gen.planning.collision import CollisionWorld
 from aerialdojo_gen.planning.grid_kernels import GridArrays, inside, polyline_clearance, segment_free
 
@@ -19,14 +19,14 @@ from aerialdojo_gen.planning.grid_kernels import GridArrays, inside, polyline_cl
 class ClearanceProfile(NamedTuple):
     """Clearance of a route by the grid and the triangles."""
 
-    corners: NDArray[np.float64]  # (m, 3) float64; the route's vertices without collinear ones, metres
+    corners: Floats  # (m, 3) float64; the route's vertices without collinear ones, metres
     inside: bool  # Whether it stays in the flight volume
-    undecided: NDArray[np.bool_]  # (max(1, m - 1),) bool; legs that the grid does not prove free
+    undecided: Flags  # (max(1, m - 1),) bool; legs that the grid does not prove free
     clearance: float  # Smallest distance from the centre line to any surface, metres, capped at the bound
 
 
 @njit(cache=True)
-def corners(points: NDArray[np.float64]) -> NDArray[np.float64]:
+def corners(points: Floats) -> Floats:
     """Drop repeated and collinear points: (n, 3) to (m, 3), ends included."""
     n = points.shape[0]
     kept = np.empty((n, 3))
@@ -49,29 +49,16 @@ def corners(points: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 @njit(cache=True)
-def _undecided_legs(points: NDArray[np.float64], radius: float, grid: GridArrays) -> NDArray[np.bool_]:
-    flags = np.ones(max(1, points.shape[0] - 1), np.bool_)
-    for i in range(points.shape[0] - 1):
-        p, q = points[i], points[i + 1]
-        flags[i] = not segment_free(p[0], p[1], p[2], q[0], q[1], q[2], radius, grid, True)
-    return flags
-
-
-@njit(cache=True)
-def _all_inside(points: NDArray[np.float64], grid: GridArrays) -> bool:
-    for i in range(points.shape[0]):
-        if not inside(points[i, 0], points[i, 1], points[i, 2], grid.lower, grid.upper):
-            return False
-    return True
-
-
-@njit(cache=True)
-def clearance_profile(points: NDArray[np.float64], radius: float, bound: float, grid: GridArrays) -> ClearanceProfile:
+def clearance_profile(points: Floats, radius: float, bound: float, grid: GridArrays) -> ClearanceProfile:
     """Measure a route's points (n, 3), world metres, by the clearance grid alone, without FCL."""
-    p = corners(points)
-    return ClearanceProfile(
-        p, _all_inside(p, grid), _undecided_legs(p, radius, grid), polyline_clearance(p, bound, grid)
-    )
+    path, all_inside = corners(points), True
+    undecided = np.ones(max(1, len(path) - 1), np.bool_)
+    for i in range(len(path)):
+        p, q = path[i - 1], path[i]
+        all_inside = all_inside and inside(q[0], q[1], q[2], grid.lower, grid.upper)
+        if i > 0:
+            undecided[i - 1] = not segment_free(p[0], p[1], p[2], q[0], q[1], q[2], radius, grid, True)
+    return ClearanceProfile(path, all_inside, undecided, polyline_clearance(path, bound, grid))
 
 
 def certify(profile: ClearanceProfile, radius_m: float, world: CollisionWorld, prove: bool = True) -> bool:

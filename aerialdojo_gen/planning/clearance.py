@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from aerialdojo_gen.base.constants import RADIUS_M
+from aerialdojo_gen.geometry.arrays import Flags, Floats
 from aerialdojo_gen.geometry.ground import Ground
 from aerialdojo_gen.geometry.triangles import split_triangles
 from aerialdojo_gen.planning.bvh import build_bvh, crossings_above, point_distances
@@ -58,7 +59,7 @@ class ClearanceGrid:
 
     arrays: GridArrays  # Distance field, triangles and bounds, for numba kernels
     moves: NDArray[np.uint32]  # Passable moves of every cell (`aerialdojo_gen.planning.connectivity.passable_moves`)
-    sky: NDArray[np.bool_]  # (nx, ny, nz) bool; cells from which the body can fly to the ceiling
+    sky: Flags  # (nx, ny, nz) bool; cells from which the body can fly to the ceiling
     radius_m: float  # The body's radius, with the planner's margin
     cap_m: float  # Distances are capped at this
     ground: Ground | None = None  # The scene's ground where it is an open sheet
@@ -97,7 +98,7 @@ class ClearanceGrid:
         moves = passable_moves(arrays, radius_m)
         return cls(arrays, moves, connected_with_ceiling(moves), radius_m, cap_m, ground, has_curtain)
 
-    def distance_m(self, points: ArrayLike) -> NDArray[np.float64]:
+    def distance_m(self, points: ArrayLike) -> Floats:
         """Exact distances (n,), metres, from points (n, 3) or (3,) to the nearest surface, up to `cap_m`."""
         p = np.ascontiguousarray(np.asarray(points, np.float64).reshape(-1, 3))
         return np.asarray(point_distances(p, self.cap_m, self.arrays.real_tri, self.arrays.real_boxes))

@@ -14,9 +14,10 @@ from functools import cached_property
 
 import fcl
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from aerialdojo_gen.base.kernels import njit
+from aerialdojo_gen.geometry.arrays import Floats, Ints
 from aerialdojo_gen.scenes.context import context_of
 from aerialdojo_gen.scenes.model import Instance, Scene
 
@@ -35,7 +36,7 @@ def _bvh(instance: Instance) -> fcl.BVHModel:
     return model
 
 
-def _along_z(ux: float, uy: float, uz: float) -> NDArray[np.float64]:
+def _along_z(ux: float, uy: float, uz: float) -> Floats:
     """Rotation matrix whose third column is the unit vector u: FCL's capsules lie along z."""
     if abs(uz) > 1.0 - 1e-12:
         return np.eye(3)  # a capsule looks the same from both ends
@@ -54,8 +55,8 @@ class _Shapes(threading.local):
 
 @njit(cache=True)
 def _boxes_on_the_way(
-    boxes: NDArray[np.float64], ax: float, ay: float, az: float, bx: float, by: float, bz: float, r: float
-) -> NDArray[np.int64]:
+    boxes: Floats, ax: float, ay: float, az: float, bx: float, by: float, bz: float, r: float
+) -> Ints:
     """Rows of boxes (n, 6) that the segment ab enters once they are wider by r on all sides."""
     found = np.empty(len(boxes), np.int64)
     n = 0
@@ -92,13 +93,10 @@ class CollisionWorld:
         self._shapes = _Shapes()
 
     def _object(self, k: int) -> fcl.CollisionObject:
-        built = self._objects.get(k)
-        if built is None:
-            with self._lock:
-                built = self._objects.get(k)
-                if built is None:
-                    built = self._objects[k] = fcl.CollisionObject(_bvh(self._instances[k]), fcl.Transform())
-        return built
+        with self._lock:
+            if k not in self._objects:
+                self._objects[k] = fcl.CollisionObject(_bvh(self._instances[k]), fcl.Transform())
+            return self._objects[k]
 
     @cached_property
     def _manager(self) -> fcl.DynamicAABBTreeCollisionManager:
@@ -124,13 +122,10 @@ class CollisionWorld:
         """Whether a ball moving straight from `p` to `q` touches a surface: its exact sweep, a capsule."""
         ax, ay, az = np.asarray(p, np.float64).tolist()
         bx, by, bz = np.asarray(q, np.float64).tolist()
-        return self._swept(ax, ay, az, bx, by, bz, radius_m)
-
-    def _swept(self, ax: float, ay: float, az: float, bx: float, by: float, bz: float, radius_m: float) -> bool:
         dx, dy, dz = bx - ax, by - ay, bz - az
         length = math.sqrt(dx * dx + dy * dy + dz * dz)
         if length < 1e-9:
-            return self.sphere_in_collision((ax, ay, az), radius_m)
+            return self.sphere_in_collision(p, radius_m)
         key = (radius_m, round(length, 9))
         capsules = self._shapes.capsules
         capsule = capsules.get(key)
@@ -150,13 +145,12 @@ class CollisionWorld:
         self._manager.distance(self._sphere(p, _POINT_RADIUS_M), data, fcl.defaultDistanceCallback)
         return max(float(data.result.min_distance), 0.0) + _POINT_RADIUS_M
 
-    def route_in_collision(self, points: Sequence[ArrayLike] | NDArray[np.float64], radius_m: float) -> bool:
+    def route_in_collision(self, points: Sequence[ArrayLike] | Floats, radius_m: float) -> bool:
         """Whether a ball that follows a polyline (n, 3), world metres, touches a surface."""
         p = np.asarray(points, np.float64)
         if len(p) == 1:
             return self.sphere_in_collision(p[0], radius_m)
-        places = [(x, y, z) for x, y, z in p.tolist()]
-        return any(self._swept(*a, *b, radius_m) for a, b in itertools.pairwise(places))
+        return any(self.segment_in_collision(a, b, radius_m) for a, b in itertools.pairwise(p))
 
     def _sphere(self, p: ArrayLike, radius_m: float) -> fcl.CollisionObject:
         spheres = self._shapes.spheres

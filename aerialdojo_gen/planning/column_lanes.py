@@ -18,7 +18,8 @@ from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from aerialdojo_gen.base.kernels import njit
-from aerialdojo_gen.planning.column_kernels import DOWN, FLAT, KIND_OF, KINDS, UP
+from aerialdojo_gen.geometry.arrays import Singles
+from aerialdojo_gen.planning.connectivity import DOWN, FLAT, KIND_OF, KINDS, UP
 from aerialdojo_gen.planning.vectors import INT32, constant, data_of, floats, load, pointer, splat
 
 LANES = 16
@@ -132,7 +133,7 @@ _scan_up, _scan_down = _scan(UP), _scan(DOWN)
 
 @njit(cache=True, error_model="numpy")
 def relax_column(
-    costs: NDArray[np.float32], passable: NDArray[np.uint32], clearance: NDArray[np.float32], first: int, n: int,
+    costs: Singles, passable: NDArray[np.uint32], clearance: Singles, first: int, n: int,
     length: np.float32, coarse: np.float32,
 ) -> None:  # fmt: skip
     """Relax the vertical moves between n cells from `first` on, up and then down; n is at least `MIN_CELLS`."""

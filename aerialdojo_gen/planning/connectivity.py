@@ -1,4 +1,4 @@
-"""Passable moves between cells of the clearance grid, and the cells connected with the sky."""
+"""Moves between cells of the clearance grid: lengths, which are passable, and the cells connected with the sky."""
 
 from __future__ import annotations
 
@@ -8,7 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.base.kernels import njit
+from aerialdojo_gen.geometry.arrays import Flags, Singles
 from aerialdojo_gen.planning.grid_kernels import GridArrays, segment_free
+from aerialdojo_gen.planning.preference import CLEARANCE_COST_UNIT
 
 # Half of the moves between cells: neighbours in the plane, knight's moves in the plane, up. Move k + 9 undoes move k.
 _HALF = ((1, 0, 0), (0, 1, 0), (1, 1, 0), (-1, 1, 0), (2, 1, 0), (1, 2, 0), (-1, 2, 0), (-2, 1, 0), (0, 0, 1))
@@ -18,6 +20,34 @@ MOVE_LENGTHS = np.sqrt((MOVES**2).sum(axis=1))
 # The two shorter moves that make up a diagonal or knight's move; -1 for the axes.
 _PARTS = np.array([(-1, -1), (-1, -1), (0, 1), (9, 1), (0, 2), (1, 2), (1, 3), (9, 3), (-1, -1)], np.int64)
 _ONE = np.uint32(1)
+# Costs are multiples of this, so that float32 adds them without rounding and equal costs compare equal.
+QUANTUM_M = 2.0**-12
+# Quantum of the lengths that the clearance cost is multiplied by, for the same reason.
+_COARSE_M = QUANTUM_M / CLEARANCE_COST_UNIT
+UP = N_HALF - 1
+DOWN = UP + N_HALF
+FLAT = np.flatnonzero(MOVES[:, 2] == 0)
+# Kinds of moves (axis, diagonal, knight's): the first move of each kind, and the kind of every move.
+_, KINDS, KIND_OF = np.unique(MOVE_LENGTHS, return_index=True, return_inverse=True)
+_SQRT2, _SQRT5 = math.sqrt(2.0), math.sqrt(5.0)
+
+
+@njit(cache=True)
+def move_lengths(cell: float) -> tuple[Singles, Singles]:
+    """Lengths of moves, and factors of the clearance cost of the cell that they leave; metres, whole quanta."""
+    lengths = (np.rint(MOVE_LENGTHS * cell / QUANTUM_M) * QUANTUM_M).astype(np.float32)
+    return lengths, (np.rint(MOVE_LENGTHS * cell / _COARSE_M) * _COARSE_M).astype(np.float32)
+
+
+@njit(cache=True, inline="always")
+def grid_metric(dx: float, dy: float, dz: float) -> float:
+    """Length of a displacement in the grid's 16 directions and the vertical; in the displacement's unit."""
+    a, b = abs(dx), abs(dy)
+    high, low = max(a, b), min(a, b)
+    flat = (
+        high - 2.0 * low + _SQRT5 * low if 2.0 * low <= high else _SQRT5 * (high - low) + _SQRT2 * (2.0 * low - high)
+    )
+    return flat + abs(dz)
 
 
 @njit(cache=True, inline="always")
@@ -48,9 +78,7 @@ def _both_detours_passable(moves: NDArray[np.uint32], i: int, j: int, k: int, m:
 
 
 @njit(cache=True)
-def _passable(
-    moves: NDArray[np.uint32], i: int, j: int, k: int, m: int, radius: float, grid: GridArrays
-) -> bool:  # fmt: skip
+def _passable(moves: NDArray[np.uint32], i: int, j: int, k: int, m: int, radius: float, grid: GridArrays) -> bool:
     """Whether a move that the distance field does not prove free is passable."""
     # Both detours pass half a cell from the middle of the square: a thinner body would leave room for a pole there.
     if 2.0 * radius >= grid.cell:
@@ -102,7 +130,7 @@ def passable_moves(grid: GridArrays, radius: float) -> NDArray[np.uint32]:
 
 
 @njit(cache=True, nogil=True)
-def connected_with_ceiling(moves: NDArray[np.uint32]) -> NDArray[np.bool_]:
+def connected_with_ceiling(moves: NDArray[np.uint32]) -> Flags:
     """Cells, (nx, ny, nz) bool, that `passable_moves` connects with the highest layer that has any."""
     nx, ny, nz = moves.shape
     visited = np.zeros((nx, ny, nz), np.bool_)
@@ -131,9 +159,7 @@ def connected_with_ceiling(moves: NDArray[np.uint32]) -> NDArray[np.bool_]:
 
 
 @njit(cache=True)
-def reaches_marked_cell(
-    x: float, y: float, z: float, radius: float, marked: NDArray[np.bool_], grid: GridArrays
-) -> bool:
+def reaches_marked_cell(x: float, y: float, z: float, radius: float, marked: Flags, grid: GridArrays) -> bool:
     """Whether the body at a point can move straight to one of the 64 nearest cells that is marked."""
     nx, ny, nz = marked.shape
     i0 = math.floor((x - grid.origin[0]) / grid.cell - 0.5)

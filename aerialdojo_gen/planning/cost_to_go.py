@@ -12,66 +12,116 @@ Cells are relaxed a column at a time: a column is contiguous in memory, so the l
 from __future__ import annotations
 
 import math
-from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.base.kernels import njit
-from aerialdojo_gen.planning.column_kernels import FLAT, QUANTUM_M, UP, move_lengths
+from aerialdojo_gen.geometry.arrays import Flags, Floats, Int32s, Singles
+from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.column_lanes import LANES, MIN_CELLS, relax_column, relax_flat
-from aerialdojo_gen.planning.connectivity import MOVES, cell_centre
+from aerialdojo_gen.planning.connectivity import (
+    FLAT,
+    MOVE_LENGTHS,
+    MOVES,
+    QUANTUM_M,
+    UP,
+    cell_centre,
+    grid_metric,
+    move_lengths,
+)
 from aerialdojo_gen.planning.grid_kernels import GridArrays, segment_free
-from aerialdojo_gen.planning.preference import Preference, approach_penalty, clearance_penalty
+from aerialdojo_gen.planning.preference import NO_PREFERENCE, Preference, approach_penalty, leg_penalty
+
+# Columns are queued in bins half a cell wide; the longest move is just under five bins.
+_BINS = 8
+_DELAY = (2.0 * MOVE_LENGTHS).astype(np.int64)
+# A straight Approach is shorter than in the grid's metric by less than this share of its length.
+_APPROACH_SAVING = 0.45
+_EVERYWHERE_M = 1e6
 
 
-@lru_cache(maxsize=4)
-def columns_by_distance(reach: int) -> NDArray[np.int32]:
-    """Offsets (n, 2) of the columns around a column, the nearest first."""
-    i, j = np.meshgrid(np.arange(-reach, reach + 1), np.arange(-reach, reach + 1), indexing="ij")
-    high, low = np.maximum(abs(i), abs(j)), np.minimum(abs(i), abs(j))
-    distance = np.where(
-        2 * low <= high,
-        high - 2 * low + math.sqrt(5) * low,
-        math.sqrt(5) * (high - low) + math.sqrt(2) * (2 * low - high),
-    ).ravel()
-    near = np.flatnonzero(distance <= reach)
-    near = near[np.argsort(distance[near], kind="stable")]
-    return np.stack([i.ravel()[near], j.ravel()[near]], axis=1).astype(np.int32)
+class Area(NamedTuple):
+    """The part of a grid in which costs are computed."""
+
+    start: Floats  # (3,) float64; cells are left out where the straight way from here
+    goal: Floats  # and `weight` times that to the goal, less what an Approach saves,
+    approach: float
+    weight: float
+    reach: float  # exceed this, metres
+    bound: float  # No level move leads to a larger cost, metres
+    columns: float  # Columns farther from the goal's are written, but nothing goes on from there; cells
+
+
+class Memory(NamedTuple):
+    """Working memory of an expansion, by column."""
+
+    first: NDArray[np.int16]  # (nx, ny) int16; range of its cells within reach
+    last: NDArray[np.int16]  # 0 where that is not known yet, -1 for none
+    limit: Singles  # (nx, ny) float32; maximum cost of these cells, metres
+    waiting: Flags  # (nx, ny) bool; queued columns
+    next: Int32s  # (nx * ny,) int32; columns in bins, as linked lists
+    written: Int32s  # (nx * ny,) int32; columns in the order in which they were reached
+
+
+def make_memory(shape: tuple[int, ...]) -> Memory:
+    """Reserve memory for expansions in a grid, one at a time."""
+    nx, ny, _ = shape
+    return Memory(
+        np.zeros((nx, ny), np.int16), np.zeros((nx, ny), np.int16), np.empty((nx, ny), np.float32),
+        np.zeros((nx, ny), np.bool_), np.empty(nx * ny, np.int32), np.empty(nx * ny, np.int32),
+    )  # fmt: skip
+
+
+def cost_to_go(
+    goal: Floats, grid: ClearanceGrid, approach: float, bound: float, reach: float,
+    prefer: Preference = NO_PREFERENCE, clearance_cost: Singles | None = None,
+    cost: Singles | None = None,
+) -> Singles:  # fmt: skip
+    """Cheapest costs over passable moves to a goal (4,) from cells up to `bound`, (nx, ny, nz) metres; inf elsewhere.
+
+    `prefer` is what the Approach costs and `clearance_cost` what the cells do; `reach` metres from the goal's column
+    the expansion ends.
+    """
+    moves = grid.moves
+    cost = np.empty(moves.shape, np.float32) if cost is None else cost
+    clearance_cost = np.zeros(moves.shape, np.float32) if clearance_cost is None else clearance_cost
+    cost.fill(np.inf)
+    seeds = seed_goal(*goal, approach, grid.radius_m, grid.arrays, moves, cost, prefer)
+    expand_cost(seeds, bound, reach, grid.arrays, moves, cost, clearance_cost)
+    return cost
+
+
+@njit(cache=True, inline="always")
+def _cells_about(place: float, reach: float, origin: float, cell: float, n: int) -> tuple[int, int]:
+    """First cell and end of those whose centres lie within reach along an axis of n cells."""
+    first = math.ceil((place - reach - origin) / cell - 0.5)
+    return max(0, first), min(n - 1, math.floor((place + reach - origin) / cell - 0.5)) + 1
 
 
 @njit(cache=True)
 def seed_goal(
     gx: float, gy: float, gz: float, yaw: float, reach: float, radius: float,
-    grid: GridArrays, moves: NDArray[np.uint32], cost: NDArray[np.float32], prefer: Preference,
-) -> NDArray[np.int32]:  # fmt: skip
+    grid: GridArrays, moves: NDArray[np.uint32], cost: Singles, prefer: Preference,
+) -> Int32s:  # fmt: skip
     """Write the cost of the straight path to the goal into the free cells within `reach`; return their indices."""
     nx, ny, nz = cost.shape
     found = np.empty(4096, np.int32)
     n = 0
-    i0, i1 = (
-        math.ceil((gx - reach - grid.origin[0]) / grid.cell - 0.5),
-        (gx + reach - grid.origin[0]) / grid.cell - 0.5,
-    )
-    j0, j1 = (
-        math.ceil((gy - reach - grid.origin[1]) / grid.cell - 0.5),
-        (gy + reach - grid.origin[1]) / grid.cell - 0.5,
-    )
-    k0, k1 = (
-        math.ceil((gz - reach - grid.origin[2]) / grid.cell - 0.5),
-        (gz + reach - grid.origin[2]) / grid.cell - 0.5,
-    )
-    for i in range(max(0, i0), min(nx - 1, math.floor(i1)) + 1):
-        for j in range(max(0, j0), min(ny - 1, math.floor(j1)) + 1):
-            for k in range(max(0, k0), min(nz - 1, math.floor(k1)) + 1):
+    i0, i1 = _cells_about(gx, reach, grid.origin[0], grid.cell, nx)
+    j0, j1 = _cells_about(gy, reach, grid.origin[1], grid.cell, ny)
+    k0, k1 = _cells_about(gz, reach, grid.origin[2], grid.cell, nz)
+    for i in range(i0, i1):
+        for j in range(j0, j1):
+            for k in range(k0, k1):
                 if moves[i, j, k] == 0 or n == found.shape[0]:
                     continue
                 x, y, z = cell_centre(i, j, k, grid)
                 d = math.sqrt((x - gx) ** 2 + (y - gy) ** 2 + (z - gz) ** 2)
                 if d <= reach and segment_free(x, y, z, gx, gy, gz, radius, grid, False):
                     d += approach_penalty(gx - x, gy - y, yaw, d, prefer.ahead_cos, prefer.approach_penalty)
-                    d += clearance_penalty(x, y, z, gx, gy, gz, prefer.clearance, prefer.weight,
-                                 grid.origin[0], grid.origin[1], grid.origin[2], grid.cell, grid.field)  # fmt: skip
+                    d += leg_penalty(x, y, z, gx, gy, gz, prefer, grid)
                     cost[i, j, k] = round(d / QUANTUM_M) * QUANTUM_M
                     found[n] = (i * ny + j) * nz + k
                     n += 1
@@ -79,86 +129,112 @@ def seed_goal(
 
 
 def expand_cost(
-    seeds: NDArray[np.int32],
-    order: NDArray[np.int32],
-    bound: float,
-    cell: float,
-    moves: NDArray[np.uint32],
-    cost: NDArray[np.float32],
-    clearance_cost: NDArray[np.float32],
-) -> int:
-    """Cheapest costs over passable moves from seeded cells, into `cost` (nx, ny, nz); return the column visits.
-
-    Label-correcting by columns, equal to Dijkstra's to the bit as quanta add up exactly.
-    """
-    lacking = MIN_CELLS - cost.shape[2]
-    if lacking <= 0:
-        return int(_expand(seeds, order, bound, cell, moves, cost, clearance_cost))
+    seeds: Int32s, bound: float, reach: float, grid: GridArrays, moves: NDArray[np.uint32],
+    cost: Singles, clearance_cost: Singles,
+) -> int:  # fmt: skip
+    """Write the costs from seeded cells on into `cost` (nx, ny, nz); return the column visits."""
+    lacking = max(0, MIN_CELLS - cost.shape[2])
     # Impassable cells on top make a low grid's columns long enough.
     high = [
-        np.pad(a, ((0, 0), (0, 0), (0, lacking)), constant_values=v)
+        np.pad(a, ((0, 0), (0, 0), (0, lacking)), constant_values=v) if lacking else a
         for a, v in ((moves, 0), (cost, np.inf), (clearance_cost, 0))
     ]
     column, k = np.divmod(seeds, cost.shape[2])
-    visits = int(_expand((column * MIN_CELLS + k).astype(np.int32), order, bound, cell, *high))
-    cost[:] = high[1][:, :, :-lacking]
-    return visits
+    nowhere = np.zeros(3)
+    area = Area(nowhere, nowhere, 0.0, 1.0, _EVERYWHERE_M, bound, float(math.ceil(reach / grid.cell)))
+    _, visits = expand(
+        (column * high[1].shape[2] + k).astype(np.int32), area, grid, *high, make_memory(high[1].shape)
+    )
+    if lacking:
+        cost[:] = high[1][:, :, :-lacking]
+    return int(visits)
 
 
 @njit(cache=True, error_model="numpy")
-def _expand(
-    seeds: NDArray[np.int32], order: NDArray[np.int32], bound: float, cell: float, moves: NDArray[np.uint32],
-    cost: NDArray[np.float32], clearance_cost: NDArray[np.float32],
-) -> int:  # fmt: skip
+def _span(i: int, j: int, area: Area, grid: GridArrays, nz: int) -> tuple[int, int, float]:
+    """Range of a column's cells within reach, and their maximum cost; a last of -1 for none."""
+    cell, start, goal, weight = grid.cell, area.start, area.goal, area.weight
+    x, y, oz = grid.origin[0] + (i + 0.5) * cell, grid.origin[1] + (j + 0.5) * cell, grid.origin[2]
+    from_start = math.sqrt((x - start[0]) ** 2 + (y - start[1]) ** 2)
+    to_goal = grid_metric(x - goal[0], y - goal[1], 0.0) - _APPROACH_SAVING * area.approach
+    remaining = area.reach - from_start - weight * to_goal
+    low, high = min(start[2], goal[2]), max(start[2], goal[2])
+    if remaining < high - low:
+        return 0, -1, 0.0
+    # Solve |z - start| + weight · |z - goal| = left outside of the two; between them nothing is cut off.
+    low = min(low, (start[2] + weight * goal[2] - remaining) / (1.0 + weight))
+    high = max(high, (start[2] + weight * goal[2] + remaining) / (1.0 + weight))
+    first = max(0, int((low - oz) / cell - 0.5))
+    last = min(max(int((high - oz) / cell + 0.5) + 1, first + MIN_CELLS), nz)
+    return min(first, last - MIN_CELLS), last, min(area.bound, (area.reach - from_start) / weight)
+
+
+@njit(cache=True, error_model="numpy")
+def expand(
+    seeds: Int32s, area: Area, grid: GridArrays, moves: NDArray[np.uint32], cost: Singles,
+    clearance_cost: Singles, memory: Memory,
+) -> tuple[int, int]:  # fmt: skip
+    """Write the costs from seeded cells on, a column at a time; return how many columns are written, and visits.
+
+    Label-correcting, with columns queued by their distance; equal to Dijkstra's to the bit as quanta add up exactly.
+    """
     nx, ny, nz = cost.shape
-    lengths, coarse = move_lengths(cell)
-    limits = np.full(len(FLAT), bound, np.float32)
-    queued = np.zeros((nx, ny), np.bool_)
-    costs, passable, clearance = cost.reshape(-1), moves.reshape(-1), clearance_cost.reshape(-1)
-    targets, improved = np.empty(len(FLAT), np.int64), np.empty(len(FLAT), np.uint8)
-    n_queued, visits = 0, 0
-    middle_i, middle_j = 0, 0
+    costs, flat_moves, flat_clearance = cost.reshape(-1), moves.reshape(-1), clearance_cost.reshape(-1)
+    first, last, limit, waiting, nexts, written = memory
+    lengths, coarse = move_lengths(grid.cell)
+    targets, limits = np.empty(len(FLAT), np.int64), np.empty(len(FLAT), np.float32)
+    improved = np.empty(len(FLAT), np.uint8)
+    bins = np.full(_BINS, -1, np.int32)
+    n, visits, remaining, bin_number, middle_i, middle_j = 0, 0, 0, 0, 0, 0
     for seed in seeds:
-        middle_i, middle_j = seed // nz // ny, seed // nz % ny
-        if not queued[middle_i, middle_j]:
-            queued[middle_i, middle_j] = True
-            n_queued += 1
-    n = order.shape[0]
-    outward = True
-    while n_queued > 0:
-        visits_before = visits
-        for a in range(n):
-            b = a if outward else n - 1 - a
-            i, j = middle_i + order[b, 0], middle_j + order[b, 1]
-            if i < 0 or j < 0 or i >= nx or j >= ny or not queued[i, j]:
+        c = seed // nz
+        i, j = middle_i, middle_j = c // ny, c % ny
+        if last[i, j] == 0:
+            first[i, j], last[i, j], limit[i, j] = _span(i, j, area, grid, nz)
+            written[n] = c
+            n += 1
+        if last[i, j] > 0 and not waiting[i, j]:
+            waiting[i, j], nexts[c], bins[0] = True, bins[0], c
+            remaining += 1
+    while remaining > 0:
+        while bins[bin_number % _BINS] < 0:
+            bin_number += 1
+        c = bins[bin_number % _BINS]
+        bins[bin_number % _BINS] = nexts[c]
+        remaining, visits = remaining - 1, visits + 1
+        i, j = c // ny, c % ny
+        waiting[i, j] = False
+        k0, k1, base = first[i, j], last[i, j], c * nz
+        relax_column(costs, flat_moves, flat_clearance, base + k0, k1 - k0, lengths[UP], coarse[UP])
+        for m in range(len(FLAT)):
+            u, v = i + MOVES[FLAT[m], 0], j + MOVES[FLAT[m], 1]
+            targets[m], improved[m] = -1, 0
+            if not (0 <= u < nx and 0 <= v < ny) or last[u, v] < 0:
                 continue
-            queued[i, j] = False
-            n_queued -= 1
-            visits += 1
-            base = (i * ny + j) * nz
-            relax_column(costs, passable, clearance, base, nz, lengths[UP], coarse[UP])
-            for m in range(len(FLAT)):
-                u, v = i + MOVES[FLAT[m], 0], j + MOVES[FLAT[m], 1]
-                targets[m] = (u * ny + v) * nz if 0 <= u < nx and 0 <= v < ny else -1
-            improved[:] = 0
-            for k in range(0, nz, LANES):
-                k = min(k, nz - LANES)
-                relax_flat(costs, passable, clearance, base + k, k, lengths, coarse, targets, limits, improved)
-            for m in range(len(FLAT)):
-                u, v = i + MOVES[FLAT[m], 0], j + MOVES[FLAT[m], 1]
-                if improved[m] and not queued[u, v]:
-                    queued[u, v] = True
-                    n_queued += 1
-        if visits == visits_before:
-            break  # the columns still queued lie beyond the reach
-        outward = not outward
-    return visits
+            if last[u, v] == 0:
+                first[u, v], last[u, v], limit[u, v] = _span(u, v, area, grid, nz)
+                written[n] = u * ny + v
+                n += 1
+            if last[u, v] > 0:
+                targets[m], limits[m] = (u * ny + v) * nz, limit[u, v]
+        for k in range(k0, k1, LANES):
+            k = min(k, k1 - LANES)
+            relax_flat(
+                costs, flat_moves, flat_clearance, base + k, k, lengths, coarse, targets, limits, improved
+            )  # fmt: skip
+        for m in range(len(FLAT)):
+            u, v = i + MOVES[FLAT[m], 0], j + MOVES[FLAT[m], 1]
+            if improved[m] and not waiting[u, v] and grid_metric(u - middle_i, v - middle_j, 0.0) <= area.columns:
+                d, b = u * ny + v, (bin_number + _DELAY[FLAT[m]]) % _BINS
+                waiting[u, v], nexts[d], bins[b] = True, bins[b], d
+                remaining += 1
+    return n, visits
 
 
 @njit(cache=True)
 def extra_cost(
-    x: float, y: float, z: float, goal: NDArray[np.float64], grid: GridArrays, moves: NDArray[np.uint32],
-    cost: NDArray[np.float32], clearance_cost: NDArray[np.float32],
+    x: float, y: float, z: float, goal: Floats, grid: GridArrays, moves: NDArray[np.uint32],
+    cost: Singles, clearance_cost: Singles,
 ) -> float:  # fmt: skip
     """The part of a point's cost-to-go that is not length, along the cheapest grid path; 0 if unreached."""
     nx, ny, nz = cost.shape
@@ -194,15 +270,13 @@ def extra_cost(
 
 
 @njit(cache=True)
-def cost_at(x: float, y: float, z: float, grid: GridArrays, cost: NDArray[np.float32]) -> float:
+def cost_at(x: float, y: float, z: float, grid: GridArrays, cost: Singles) -> float:
     """Cost-to-go of a point, metres: trilinear between the 8 nearest cells if they agree, else via the cheapest."""
     return cost_between(x, y, z, grid.origin[0], grid.origin[1], grid.origin[2], grid.cell, cost)
 
 
 @njit(cache=True, error_model="numpy")
-def cost_between(
-    x: float, y: float, z: float, ox: float, oy: float, oz: float, cell: float, cost: NDArray[np.float32]
-) -> float:  # fmt: skip
+def cost_between(x: float, y: float, z: float, ox: float, oy: float, oz: float, cell: float, cost: Singles) -> float:
     """`cost_at` for inner loops, where passing a tuple of arrays costs more than the work; inf if unreached."""
     nx, ny, nz = cost.shape
     fx, fy, fz = (x - ox) / cell - 0.5, (y - oy) / cell - 0.5, (z - oz) / cell - 0.5
@@ -234,3 +308,26 @@ def cost_between(
         min(min(a + r00 + s, b + r00 + t), min(c + r01 + s, d + r01 + t)),
         min(min(e + r10 + s, f + r10 + t), min(g + r11 + s, h + r11 + t)),
     )
+
+
+@njit(cache=True)
+def lengths_at(
+    points: Floats, goal: Floats, grid: GridArrays, moves: NDArray[np.uint32], cost: Singles, clearance_cost: Singles
+) -> Floats:
+    """Lengths of the cheapest grid paths from points, (n, 3) float64 metres; (n,) float64 metres."""
+    values = np.empty(len(points))
+    for i in range(len(points)):
+        x, y, z = points[i, 0], points[i, 1], points[i, 2]
+        values[i] = cost_at(x, y, z, grid, cost)
+        if values[i] < np.inf:
+            values[i] -= extra_cost(x, y, z, goal, grid, moves, cost, clearance_cost)
+    return values
+
+
+@njit(cache=True)
+def costs_at(points: Floats, grid: GridArrays, cost: Singles) -> Floats:
+    """Cost-to-go of points, (n, 3) float64 metres; (n,) float64 metres."""
+    values = np.empty(len(points))
+    for i in range(len(points)):
+        values[i] = cost_at(points[i, 0], points[i, 1], points[i, 2], grid, cost)
+    return values

@@ -20,13 +20,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from aerialdojo_gen.base.constants import APPROACH
 from aerialdojo_gen.base.kernels import njit
+from aerialdojo_gen.geometry.arrays import Flags, Floats
 from aerialdojo_gen.geometry.motion import TURN_RAD
 from aerialdojo_gen.geometry.portable import atan2
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.collision import CollisionWorld
 from aerialdojo_gen.planning.grid_kernels import GridArrays, segment_free
-
-Floats = NDArray[np.float64]
 
 _FREE, _BLOCKED, _UNDECIDED = 0, 1, 2
 # What is blocked by the triangles by more than rounding is blocked for FCL too.
@@ -38,7 +37,7 @@ class Difficulty(NamedTuple):
 
     free_length_m: Floats  # (n,) float64; shortest length without obstacles
     plan_detour: Floats  # (n,) float64; the route's length over it, at least 1
-    straight_line_free: NDArray[np.bool_]  # (n,) bool; whether the body could fly straight from start to goal
+    straight_line_free: Flags  # (n,) bool; whether the body could fly straight from start to goal
     climb_m: Floats  # (n,) float64; metres flown upwards, including the Approach
 
 
@@ -56,7 +55,7 @@ def _classify(starts: Floats, goals: Floats, radius: float, grid: GridArrays) ->
 
 def straight_lines_free(
     starts: Floats, goals: Floats, radius_m: float, grid: ClearanceGrid, world: CollisionWorld
-) -> NDArray[np.bool_]:
+) -> Flags:
     """Whether the body touches nothing on the straight lines from starts to goals, (n, 3) world metres; (n,) bool."""
     p, q = (np.ascontiguousarray(points, np.float64) for points in (starts, goals))
     verdicts = _classify(p, q, radius_m, grid.arrays)

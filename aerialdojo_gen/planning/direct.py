@@ -9,12 +9,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aerialdojo_gen.base.kernels import njit
+from aerialdojo_gen.geometry.arrays import Floats, Ints, Singles
 from aerialdojo_gen.geometry.motion import N_HEADINGS, TURN_RAD
 from aerialdojo_gen.planning.grid_kernels import GridArrays, bound_at, inside, segment_free
-from aerialdojo_gen.planning.preference import AHEAD_ROUNDING_M, Preference, approach_penalty, clearance_penalty
+from aerialdojo_gen.planning.preference import AHEAD_ROUNDING_M, Preference, approach_penalty, leg_penalty
 from aerialdojo_gen.planning.translations import DOWN, UP
 
 # Orders of the three legs: along the nearer direction clockwise, counter-clockwise, vertical.
@@ -30,7 +30,7 @@ _COS, _SIN, _COS_HALF = math.cos(TURN_RAD), math.sin(TURN_RAD), math.cos(TURN_RA
 @njit(cache=True, error_model="numpy")
 def _proven_free(
     px: float, py: float, pz: float, qx: float, qy: float, qz: float, radius: float,
-    ox: float, oy: float, oz: float, cell: float, field: NDArray[np.float32],
+    ox: float, oy: float, oz: float, cell: float, field: Singles,
 ) -> bool:  # fmt: skip
     """Whether the grid proves a segment free; for inner loops, weaker than `segment_free`."""
     dx, dy, dz = qx - px, qy - py, qz - pz
@@ -91,9 +91,9 @@ def _any_order_proven_free(
 
 @njit(cache=True, error_model="numpy")
 def direct_legs(
-    x: float, y: float, z: float, start_yaw: float, goal: NDArray[np.float64], goal_yaw: float, h: float,
+    x: float, y: float, z: float, start_yaw: float, goal: Floats, goal_yaw: float, h: float,
     max_length: float, radius: float, approach: float, prefer: Preference, grid: GridArrays,
-    directions: NDArray[np.int64], metres: NDArray[np.int64],
+    directions: Ints, metres: Ints,
 ) -> tuple[float, float]:  # fmt: skip
     """Write the direct path to the goal, at most three legs, into `directions` and `metres`.
 
@@ -147,14 +147,11 @@ def direct_legs(
         ux, uy, uz, goal[0], goal[1], goal[2], radius, grid, False
     ):
         return np.inf, 0.0
-    gx, gy, gz, cell = grid.origin[0], grid.origin[1], grid.origin[2], grid.cell
     length = na + nb + nz + math.sqrt((goal[0] - ux) ** 2 + (goal[1] - uy) ** 2 + (goal[2] - uz) ** 2)
     length += approach_penalty(
         goal[0] - ux, goal[1] - uy, goal_yaw, length - na - nb - nz, prefer.ahead_cos, prefer.approach_penalty
     )
-    last = clearance_penalty(
-        ux, uy, uz, goal[0], goal[1], goal[2], prefer.clearance, prefer.weight, gx, gy, gz, cell, grid.field
-    )  # fmt: skip
+    last = leg_penalty(ux, uy, uz, goal[0], goal[1], goal[2], prefer, grid)
     min_extra, order = np.inf, 0
     for o in range(_ORDERS.shape[0]):
         px, py, pz, extra = x, y, z, 0.0
@@ -174,9 +171,7 @@ def direct_legs(
             ):
                 extra = np.inf
                 break
-            extra += clearance_penalty(
-                px, py, pz, qx, qy, qz, prefer.clearance, prefer.weight, gx, gy, gz, cell, grid.field
-            )  # fmt: skip
+            extra += leg_penalty(px, py, pz, qx, qy, qz, prefer, grid)
             if extra >= min_extra:
                 break
             px, py, pz = qx, qy, qz

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aerialdojo_gen.base.kernels import njit
+from aerialdojo_gen.geometry.arrays import Flags, Floats, Ints, Singles
 from aerialdojo_gen.geometry.triangles import point_triangle_d2
 
 # float32 rounds either way: take off more than it can add, so that a bound stays a bound.
@@ -27,9 +27,7 @@ def _edge_d2(wx: float, wy: float, wz: float, ux: float, uy: float, uz: float, i
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def _lower_in_band(
-    tri: NDArray[np.float64], origin: NDArray[np.float64], cell: float, band: float, field: NDArray[np.float32]
-) -> None:
+def _lower_in_band(tri: Floats, origin: Floats, cell: float, band: float, field: Singles) -> None:
     """Lower `field` (squared distances) to the distance of every triangle, up to `band` from the triangle's box.
 
     Cells whose distance is below that to the triangle's box or plane are skipped. The distance is that of
@@ -101,14 +99,7 @@ def _lower_in_band(
 
 
 @njit(cache=True, nogil=True)
-def _mark_outside_seeds(
-    tri: NDArray[np.float64],
-    origin: NDArray[np.float64],
-    cell: float,
-    margin_below: NDArray[np.int64],
-    n: NDArray[np.int64],
-    seeds: NDArray[np.bool_],
-) -> None:
+def _mark_outside_seeds(tri: Floats, origin: Floats, cell: float, margin_below: Ints, n: Ints, seeds: Flags) -> None:
     """Mark the cells outside the grid of `n` cells that hold a surface point, and some with a centre as near to one.
 
     `seeds` begins `margin_below` cells below the grid's first cell.
@@ -143,7 +134,7 @@ def _mark_outside_seeds(
 
 
 @njit(cache=True, nogil=True)
-def _lower_row(row: NDArray[np.float32], other: NDArray[np.float32], add: np.float32) -> None:
+def _lower_row(row: Singles, other: Singles, add: np.float32) -> None:
     """Lower a row to another one plus a number; a function of its own, so that it is vectorised."""
     for k in range(len(row)):
         value = other[k] + add
@@ -152,12 +143,7 @@ def _lower_row(row: NDArray[np.float32], other: NDArray[np.float32], add: np.flo
 
 @njit(cache=True, nogil=True)
 def _fill_outside_band(
-    field: NDArray[np.float32],
-    cell: float,
-    band: float,
-    cap: float,
-    seeds: NDArray[np.bool_],
-    margin_below: NDArray[np.int64],
+    field: Singles, cell: float, band: float, cap: float, seeds: Flags, margin_below: Ints
 ) -> None:
     """Turn squared distances into distances, and fill in lower bounds beyond the band.
 
@@ -175,18 +161,14 @@ def _fill_outside_band(
     along_z = np.empty((mx, my, nz), np.float32)
     for i in range(mx):
         for j in range(my):
-            last = -100000
-            for k in range(mz):
-                if seeds[i, j, k]:
-                    last = k
-                if bz <= k < bz + nz:
-                    along_z[i, j, k - bz] = min(far, np.float32((k - last) * (k - last)))
-            last = 100000
-            for k in range(mz - 1, -1, -1):
-                if seeds[i, j, k]:
-                    last = k
-                if bz <= k < bz + nz:
-                    along_z[i, j, k - bz] = min(along_z[i, j, k - bz], np.float32(min(1e6, (last - k) * (last - k))))
+            along_z[i, j] = far
+            for upward in (True, False):
+                away = 100000
+                for n in range(mz):
+                    k = n if upward else mz - 1 - n
+                    away = 0 if seeds[i, j, k] else away + 1
+                    if bz <= k < bz + nz:
+                        along_z[i, j, k - bz] = min(along_z[i, j, k - bz], np.float32(away * away))
     along_y = np.empty((mx, ny, nz), np.float32)
     for i in range(mx):
         for j in range(ny):
@@ -208,9 +190,7 @@ def _fill_outside_band(
                     field[i, j, k] = min(bound, cap) - _ROUNDING_M
 
 
-def _seeds(
-    triangles: NDArray[np.float64], origin: NDArray[np.float64], field: NDArray[np.float32], cell: float, cap: float
-) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
+def _seeds(triangles: Floats, origin: Floats, field: Singles, cell: float, cap: float) -> tuple[Flags, Ints]:
     """Cells near enough to a surface to hold its points, (mx, my, mz) bool, and their margin below the grid."""
     half = cell * math.sqrt(3.0) / 2
     n = np.array(field.shape, np.int64)
@@ -233,13 +213,8 @@ def _seeds(
 
 
 def build_distance_field(
-    triangles: NDArray[np.float64],
-    origin: NDArray[np.float64],
-    shape: tuple[int, int, int],
-    cell_m: float,
-    band_m: float,
-    cap_m: float,
-) -> NDArray[np.float32]:
+    triangles: Floats, origin: Floats, shape: tuple[int, int, int], cell_m: float, band_m: float, cap_m: float
+) -> Singles:
     """Distance (nx, ny, nz) float32 from cell centres to the nearest triangle: a lower bound, exact in the band."""
     if band_m < cell_m * math.sqrt(3.0) / 2:
         raise ValueError(f"band_m = {band_m} is less than half the diagonal of a cell of {cell_m} m")

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 import pyarrow as pa
-from numpy.typing import NDArray
 
 from aerialdojo_gen.base.kernels import njit
-from aerialdojo_gen.planning.column_kernels import QUANTUM_M
+from aerialdojo_gen.geometry.arrays import Int32s, Singles
+from aerialdojo_gen.planning.connectivity import QUANTUM_M
 
 _CODEC = "lz4_raw"
 _UNREACHED = -1
@@ -22,10 +22,10 @@ class FieldCache:
 
     def __init__(self, plain_mb: float, packed_mb: float) -> None:
         self._free_bytes = {True: plain_mb * 1e6, False: packed_mb * 1e6}
-        self._plain: dict[bytes, NDArray[np.float32]] = {}
+        self._plain: dict[bytes, Singles] = {}
         self._packed: dict[bytes, bytes] = {}
 
-    def find(self, goal: bytes, scratch: NDArray[np.float32]) -> NDArray[np.float32] | None:
+    def find(self, goal: bytes, scratch: Singles) -> Singles | None:
         """Return a goal's field (nx, ny, nz), decompressed into `scratch` if necessary; None if not cached."""
         if goal in self._plain:
             return self._plain[goal]
@@ -35,7 +35,7 @@ class FieldCache:
         _unpack(np.frombuffer(steps, np.int32), scratch.reshape(-1))
         return scratch
 
-    def store(self, goal: bytes, field: NDArray[np.float32]) -> None:
+    def store(self, goal: bytes, field: Singles) -> None:
         """Store a copy of a goal's field, multiples of `QUANTUM_M` or inf, if there is room."""
         if self._reserve(True, field.nbytes):
             self._plain[goal] = field.copy()
@@ -55,7 +55,7 @@ class FieldCache:
 
 
 @njit(cache=True)
-def _pack(field: NDArray[np.float32], steps: NDArray[np.int32]) -> None:
+def _pack(field: Singles, steps: Int32s) -> None:
     previous = np.int32(0)
     for i in range(field.shape[0]):
         value = np.int32(field[i] / np.float32(QUANTUM_M)) if field[i] < np.inf else np.int32(_UNREACHED)
@@ -64,7 +64,7 @@ def _pack(field: NDArray[np.float32], steps: NDArray[np.int32]) -> None:
 
 
 @njit(cache=True)
-def _unpack(steps: NDArray[np.int32], field: NDArray[np.float32]) -> None:
+def _unpack(steps: Int32s, field: Singles) -> None:
     value = np.int32(0)
     for i in range(steps.shape[0]):
         value += steps[i]

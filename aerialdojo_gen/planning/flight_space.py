@@ -26,7 +26,7 @@ _CONTACT_M = 1e-3
 @njit(cache=True)
 def _classify(
     px: float, py: float, pz: float, qx: float, qy: float, qz: float, radius: float, grid: GridArrays
-) -> int:  # fmt: skip
+) -> int:
     if not inside(qx, qy, qz, grid.lower, grid.upper):
         return _OUTSIDE
     return _FREE if segment_free(px, py, pz, qx, qy, qz, radius, grid, True) else _UNDECIDED

@@ -6,11 +6,11 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aerialdojo_gen.base.kernels import njit
+from aerialdojo_gen.geometry.arrays import Floats, Singles
 from aerialdojo_gen.geometry.triangles import segment_triangle_d2
-from aerialdojo_gen.planning.bvh import point_distance, segment_distance
+from aerialdojo_gen.planning.bvh import segment_distance
 from aerialdojo_gen.planning.bvh_groups import segment_blocker
 
 FREE, UNKNOWN = -1, -2
@@ -19,19 +19,19 @@ FREE, UNKNOWN = -1, -2
 class GridArrays(NamedTuple):
     """Arrays of a clearance grid, for kernels."""
 
-    field: NDArray[np.float32]  # Lower bound of the distance from a cell's centre to the nearest surface, metres
-    origin: NDArray[np.float64]  # (3,) float64; lower corner of cell (0, 0, 0), metres
+    field: Singles  # Lower bound of the distance from a cell's centre to the nearest surface, metres
+    origin: Floats  # (3,) float64; lower corner of cell (0, 0, 0), metres
     cell: float  # Edge of a cell, metres
-    tri: NDArray[np.float64]
-    groups: NDArray[np.float32]  # `aerialdojo_gen.planning.bvh_groups.group_boxes` of the tree of `tri`
-    real_tri: NDArray[np.float64]
-    real_boxes: NDArray[np.float64]
-    lower: NDArray[np.float64]  # (3,) float64; where the body's centre may be, metres
-    upper: NDArray[np.float64]
+    tri: Floats
+    groups: Singles  # `aerialdojo_gen.planning.bvh_groups.group_boxes` of the tree of `tri`
+    real_tri: Floats
+    real_boxes: Floats
+    lower: Floats  # (3,) float64; where the body's centre may be, metres
+    upper: Floats
 
 
 @njit(cache=True, inline="always")
-def inside(x: float, y: float, z: float, lower: NDArray[np.float64], upper: NDArray[np.float64]) -> bool:
+def inside(x: float, y: float, z: float, lower: Floats, upper: Floats) -> bool:
     """Whether a point lies in the closed box (lower, upper), within a nanometre of rounding."""
     e = 1e-9
     return (
@@ -39,17 +39,12 @@ def inside(x: float, y: float, z: float, lower: NDArray[np.float64], upper: NDAr
     )
 
 
-@njit(cache=True, inline="always")
-def point_bound(x: float, y: float, z: float, grid: GridArrays) -> float:
-    """Lower bound of the distance from a point to the nearest surface, metres; may be negative."""
-    return bound_at(x, y, z, grid.origin[0], grid.origin[1], grid.origin[2], grid.cell, grid.field)
-
-
 @njit(cache=True, error_model="numpy")
-def bound_at(
-    x: float, y: float, z: float, ox: float, oy: float, oz: float, cell: float, field: NDArray[np.float32]
-) -> float:  # fmt: skip
-    """`point_bound` for inner loops, where passing a tuple of arrays costs more than the work."""
+def bound_at(x: float, y: float, z: float, ox: float, oy: float, oz: float, cell: float, field: Singles) -> float:
+    """Lower bound of the distance from a point to the nearest surface, metres; may be negative.
+
+    Scalars and the field: passing a tuple of arrays costs more than the work.
+    """
     i = min(max(int((x - ox) / cell), 0), field.shape[0] - 1)
     j = min(max(int((y - oy) / cell), 0), field.shape[1] - 1)
     k = min(max(int((z - oz) / cell), 0), field.shape[2] - 1)
@@ -119,7 +114,7 @@ def segment_free(
 
 
 @njit(cache=True, error_model="numpy")
-def polyline_clearance(points: NDArray[np.float64], bound: float, grid: GridArrays) -> float:
+def polyline_clearance(points: Floats, bound: float, grid: GridArrays) -> float:
     """Smallest distance, metres, from a polyline (n, 3) to any surface, at most `bound`; least clear pieces first."""
     n, last = 0, points.shape[0] - 1
     longest = 2.0 * grid.cell
@@ -127,7 +122,7 @@ def polyline_clearance(points: NDArray[np.float64], bound: float, grid: GridArra
         n += _n_pieces(points, i, longest)
     if n == 0:
         p = points[last]
-        return point_distance(p[0], p[1], p[2], bound, grid.real_tri, grid.real_boxes)
+        return segment_distance(p[0], p[1], p[2], p[0], p[1], p[2], bound, grid.real_tri, grid.real_boxes)
     ends, lower_bounds = np.empty((n, 6)), np.empty(n)
     k = 0
     for i in range(last):
@@ -138,7 +133,8 @@ def polyline_clearance(points: NDArray[np.float64], bound: float, grid: GridArra
                 ends[k, axis], ends[k, axis + 3] = p + piece / m * d, p + (piece + 1) / m * d
             e = ends[k]
             half = math.sqrt((e[3] - e[0]) ** 2 + (e[4] - e[1]) ** 2 + (e[5] - e[2]) ** 2) / 2
-            middle = point_bound((e[0] + e[3]) / 2, (e[1] + e[4]) / 2, (e[2] + e[5]) / 2, grid)
+            x, y, z = (e[0] + e[3]) / 2, (e[1] + e[4]) / 2, (e[2] + e[5]) / 2
+            middle = bound_at(x, y, z, grid.origin[0], grid.origin[1], grid.origin[2], grid.cell, grid.field)
             lower_bounds[k] = middle - half
             k += 1
     best = bound
@@ -151,6 +147,6 @@ def polyline_clearance(points: NDArray[np.float64], bound: float, grid: GridArra
 
 
 @njit(cache=True, inline="always")
-def _n_pieces(points: NDArray[np.float64], i: int, longest: float) -> int:
+def _n_pieces(points: Floats, i: int, longest: float) -> int:
     dx, dy, dz = points[i + 1, 0] - points[i, 0], points[i + 1, 1] - points[i, 1], points[i + 1, 2] - points[i, 2]
     return max(1, math.ceil(math.sqrt(dx * dx + dy * dy + dz * dz) / longest))

@@ -23,12 +23,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.base.kernels import njit
+from aerialdojo_gen.geometry.arrays import Floats, Int32s, Ints, Singles
 from aerialdojo_gen.geometry.motion import N_HEADINGS, TURN_RAD
 from aerialdojo_gen.planning.cost_to_go import cost_at, cost_between
 from aerialdojo_gen.planning.direct import direct_legs
 from aerialdojo_gen.planning.grid_kernels import FREE, GridArrays, find_blocker, segment_free
 from aerialdojo_gen.planning.preference import Preference, approach_penalty, clearance_penalty
 from aerialdojo_gen.planning.translations import (
+    DOWN,
     LIFTS_M,
     N_FLAT,
     N_STEPS,
@@ -36,7 +38,7 @@ from aerialdojo_gen.planning.translations import (
     N_TURNS,
     STEPS_M,
     TURN_BY,
-    append_legs,
+    UP,
     count_actions,
     turns_between,
     wrap_heading,
@@ -66,21 +68,21 @@ _HASH = np.uint64(0x9E3779B97F4A7C15)
 class SearchArrays(NamedTuple):
     """Working memory of a search, reused by every plan."""
 
-    pose: NDArray[np.float64]  # (n, 3) float64; position of every expanded state, metres
-    cost: NDArray[np.float64]  # (n,) float64; cost from the start
+    pose: Floats  # (n, 3) float64; position of every expanded state, metres
+    cost: Floats  # (n,) float64; cost from the start
     heading: NDArray[np.int8]  # (n,) int8; heading, and the translation that led to the state
     move: NDArray[np.int8]
-    parent: NDArray[np.int32]  # (n,) int32; expanded state before it, -1 for the start
-    edge_parent: NDArray[np.int32]
+    parent: Int32s  # (n,) int32; expanded state before it, -1 for the start
+    edge_parent: Int32s
     edge_move: NDArray[np.int8]
-    edge_next: NDArray[np.int32]
-    edge_extra: NDArray[np.float32]  # (m,) float32; clearance cost of a popped edge
-    heads: NDArray[np.int32]  # (_N_BUCKETS,) int32; first edge of every bucket, -1 for none
-    keys: NDArray[np.int64]  # (power of two,) int64; hash table of closed states
-    stamps: NDArray[np.int32]  # (power of two,) int32; search that wrote a slot of the table
-    clock: NDArray[np.int32]  # (1,) int32; number of the search
-    highest: NDArray[np.float64]  # (1,) float64
-    blockers: NDArray[np.int32]  # Last triangle that blocked an edge, by hash of the edge's middle; -1 for none
+    edge_next: Int32s
+    edge_extra: Singles  # (m,) float32; clearance cost of a popped edge
+    heads: Int32s  # (_N_BUCKETS,) int32; first edge of every bucket, -1 for none
+    keys: Ints  # (power of two,) int64; hash table of closed states
+    stamps: Int32s  # (power of two,) int32; search that wrote a slot of the table
+    clock: Int32s  # (1,) int32; number of the search
+    highest: Floats  # (1,) float64
+    blockers: Int32s  # Last triangle that blocked an edge, by hash of the edge's middle; -1 for none
 
 
 class SearchOptions(NamedTuple):
@@ -112,7 +114,7 @@ def make_search_arrays(budget: int) -> SearchArrays:
 
 
 @njit(cache=True)
-def _slot(key: int, now: int, keys: NDArray[np.int64], stamps: NDArray[np.int32]) -> int:
+def _slot(key: int, now: int, keys: Ints, stamps: Int32s) -> int:
     """Slot of a key in the table of closed states, or ~slot of its insertion point."""
     mask = keys.shape[0] - 1
     # The high bits of the product are the well mixed ones.
@@ -131,22 +133,27 @@ def _blocker_slot(x: float, y: float, z: float) -> int:
 
 
 @njit(cache=True)
-def _backtrack(node: int, parents: NDArray[np.int32], moves: NDArray[np.int8]) -> NDArray[np.int8]:
-    """Translations from the start to an expanded state."""
+def _legs_to(node: int, parents: Int32s, moves: NDArray[np.int8]) -> tuple[Ints, Ints]:
+    """Directions and metres of the translations from the start to a state, and of three more legs of 0 m."""
     count, last = 0, node
     while parents[last] >= 0:
         count += 1
         last = parents[last]
-    found = np.empty(count, np.int8)
+    directions, metres = np.zeros(count + 3, np.int64), np.zeros(count + 3, np.int64)
     while parents[node] >= 0:
         count -= 1
-        found[count] = moves[node]
+        move = int(moves[node])
+        if move < N_FLAT:
+            directions[count], metres[count] = move // N_STEPS, int(STEPS_M[move % N_STEPS])
+        else:
+            lift = LIFTS_M[move - N_FLAT]
+            directions[count], metres[count] = (UP if lift > 0 else DOWN), int(abs(lift))
         node = parents[node]
-    return found
+    return directions, metres
 
 
 @njit(cache=True, inline="always")
-def _flights(yaw: float) -> NDArray[np.float64]:
+def _flights(yaw: float) -> Floats:
     """Step (dx, dy, dz) and length of every translation from a start's yaw; (N_TRANSLATIONS, 4), metres."""
     flights = np.zeros((N_TRANSLATIONS, 4))
     for m in range(N_FLAT):
@@ -163,10 +170,10 @@ def _push(
     parent: int,
     move: int,
     entry: int,
-    edge_parent: NDArray[np.int32],
+    edge_parent: Int32s,
     edge_move: NDArray[np.int8],
-    edge_next: NDArray[np.int32],
-    heads: NDArray[np.int32],
+    edge_next: Int32s,
+    heads: Int32s,
 ) -> int:
     """Write an edge as entry `entry` and put it first in the bucket of its cost; return the bucket."""
     bucket = max(0, int(f / _BUCKET_M))
@@ -177,15 +184,18 @@ def _push(
 
 @njit(cache=True, error_model="numpy")
 def search(
-    start: NDArray[np.float64],
-    goal: NDArray[np.float64],
+    start: Floats,
+    goal: Floats,
     goal_heading: int,
-    cost_to_go: NDArray[np.float32],
+    cost_to_go: Singles,
     grid: GridArrays,
     s: SearchArrays,
     o: SearchOptions,
-) -> tuple[int, int, NDArray[np.int8]]:
-    """Search a short way from a pose (4,) to a goal (3,): status, expansions and moves (n,) without the Approach."""
+) -> tuple[int, int, Ints, Ints]:
+    """Search a short way from a pose (4,) to a goal (3,), without the Approach.
+
+    Status, expansions, and directions and metres of its legs, (n,) each.
+    """
     flights = _flights(start[3])
     # Scalars and plain arrays: passing a tuple of arrays costs more than the inner loop's work.
     pose, cost, headings, moves, parents = s.pose, s.cost, s.heading, s.move, s.parent
@@ -207,23 +217,23 @@ def search(
     n, n_edges, lowest, highest = 0, 1, 0, -1
     nearest, best, best_parent, best_is_direct = np.inf, np.inf, -1, False
     legs, metres = np.zeros(3, np.int64), np.zeros(3, np.int64)
-    no_moves = np.empty(0, np.int8)
+    no_legs = np.empty(0, np.int64)
     while True:
         # 1. Find the cheapest edge, and end the search if the best one to the goal is as good.
         while lowest < _N_BUCKETS and heads[lowest] < 0:
             lowest += 1
         tolerance = min(o.goal_tolerance + o.tolerance_growth * n, _MAX_TOLERANCE_M)
         if best - tolerance < (lowest + 1) * _BUCKET_M:
-            found_moves = _backtrack(best_parent, parents, moves)
+            way, way_metres = _legs_to(best_parent, parents, moves)
             if best_is_direct:
                 x, y, z = pose[best_parent, 0], pose[best_parent, 1], pose[best_parent, 2]
                 direct_legs(
-                    x, y, z, start[3], goal, goal_yaw, 0.0, np.inf, o.radius, o.approach, o.prefer, grid, legs, metres
+                    x, y, z, start[3], goal, goal_yaw, 0.0, np.inf, o.radius, o.approach, o.prefer, grid,
+                    way[-3:], way_metres[-3:],
                 )  # fmt: skip
-                found_moves = append_legs(found_moves, legs, metres)
-            return FOUND, n, found_moves
+            return FOUND, n, way, way_metres
         if lowest == _N_BUCKETS:
-            return EXHAUSTED, n, no_moves
+            return EXHAUSTED, n, no_legs, no_legs
         # 2. Take it.
         if lowest > highest:
             highest = lowest
@@ -283,7 +293,7 @@ def search(
                     continue
         # 6. Close the state.
         if n >= o.budget:
-            return BUDGET, n, no_moves
+            return BUDGET, n, no_legs, no_legs
         keys[slot], stamps[slot] = key, now
         pose[n, 0], pose[n, 1], pose[n, 2] = x, y, z
         cost[n], headings[n], moves[n], parents[n] = g, heading, move, parent

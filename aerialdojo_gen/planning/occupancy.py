@@ -6,9 +6,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aerialdojo_gen.base.kernels import njit
+from aerialdojo_gen.geometry.arrays import Flags, Floats
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.scenes.model import Scene
 
@@ -20,9 +20,9 @@ SLACK_M = 1e-4
 class Occupancy:
     """A grid over a scene's flight volume; cell (i, j, k) begins at ``origin_m + voxel_m * (i, j, k)``."""
 
-    occupied: NDArray[np.bool_]  # (X, Y, Z) bool; cells that a surface touches, to `SLACK_M`
-    reachable: NDArray[np.bool_]  # (X, Y, Z) bool; cells from whose centre the planner's body can fly to the ceiling
-    origin_m: NDArray[np.float64]  # (3,) float64; metres, world frame
+    occupied: Flags  # (X, Y, Z) bool; cells that a surface touches, to `SLACK_M`
+    reachable: Flags  # (X, Y, Z) bool; cells from whose centre the planner's body can fly to the ceiling
+    origin_m: Floats  # (3,) float64; metres, world frame
     voxel_m: float  # Edge of a cell, metres
 
     @classmethod
@@ -35,10 +35,7 @@ class Occupancy:
 
 
 @njit(cache=True)
-def _apart(
-    ax: float, ay: float, az: float, corners: NDArray[np.float64],
-    x: float, y: float, z: float, half: float,
-) -> bool:  # fmt: skip
+def _apart(ax: float, ay: float, az: float, corners: Floats, x: float, y: float, z: float, half: float) -> bool:
     """Whether an axis separates a triangle (3, 3) from the cube about (x, y, z)."""
     low, high = np.inf, -np.inf
     for k in range(3):
@@ -49,9 +46,7 @@ def _apart(
 
 
 @njit(cache=True, nogil=True)
-def _mark_touched(
-    tri: NDArray[np.float64], origin: NDArray[np.float64], cell: float, slack: float, occupied: NDArray[np.bool_]
-) -> None:
+def _mark_touched(tri: Floats, origin: Floats, cell: float, slack: float, occupied: Flags) -> None:
     """Mark the cells that triangles (n, 9) touch, by the separating axes of a triangle and a cube."""
     half = cell / 2 + slack
     first, last, n = np.empty(3, np.int64), np.empty(3, np.int64), occupied.shape

@@ -6,19 +6,21 @@ import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from aerialdojo_gen.base.config.sections import PlanConfig, SearchAttempt
 from aerialdojo_gen.base.constants import RADIUS_M
+from aerialdojo_gen.geometry.arrays import Floats, Int32s, Singles
 from aerialdojo_gen.geometry.motion import TURN_RAD, nearest_heading
-from aerialdojo_gen.planning.attempt import costs_at, lengths_at, plan_once
+from aerialdojo_gen.planning.attempt import plan_once
 from aerialdojo_gen.planning.certify import certify
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.collision import collision_world
 from aerialdojo_gen.planning.column_lanes import MIN_CELLS
-from aerialdojo_gen.planning.cost_to_go import columns_by_distance, expand_cost, seed_goal
+from aerialdojo_gen.planning.cost_to_go import cost_to_go, costs_at, lengths_at, seed_goal
 from aerialdojo_gen.planning.field_cache import FieldCache
 from aerialdojo_gen.planning.hybrid_astar import EXHAUSTED, FOUND, SearchArrays, SearchOptions, make_search_arrays
 from aerialdojo_gen.planning.preference import Preference, clearance_cost_field
@@ -60,7 +62,7 @@ class Route:
     """
 
     outcome: str
-    poses: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 4)))
+    poses: Floats = field(default_factory=lambda: np.empty((0, 4)))
     actions: NDArray[np.int8] = field(default_factory=lambda: np.empty(0, np.int8))
     length_m: float = 0.0
     expansions: int = 0
@@ -102,12 +104,13 @@ class Planner:
         self._clearance_cost = clearance_cost_field(self.grid.arrays.field, self._prefer)
         self._cost = self._scratch = np.empty(self.grid.moves.shape, np.float32)
         self._fields = FieldCache(0, 0)
-        self._order = columns_by_distance(
-            math.ceil((config.max_length_m * config.length_slack + 2 * config.max_approach_m) / config.cell_m)
-        )
+        # A route's final heading is up to half a turn off the goal's yaw, so the grid's Approach may be too.
+        angle = min(math.radians(config.max_approach_angle_deg) + TURN_RAD / 2, math.pi)
+        self._prefer_on_grid = self._prefer._replace(ahead_cos=math.cos(angle))
+        self._longest_m = config.max_length_m * config.length_slack
+        self._bound_m = self._longest_m + _EXTRA_M * config.clearance_weight
         self._memory: dict[int, SearchArrays] = {}
         self._blocked_starts: dict[bytes, bool] = {}
-        self._near_field: NearField | None = None
 
     def plan_target(self, goal: ArrayLike, starts: ArrayLike) -> list[Route]:
         """Plan from every start to one goal.
@@ -153,13 +156,9 @@ class Planner:
         low = self.grid.moves.shape[2] < MIN_CELLS
         if low or weight < 1.0 or self.grid.in_collision(goal_pose[:3]) or self._blocked(start_pose):
             return self.plan_target(goal_pose, start_pose)[0]
-        if self._near_field is None:
-            self._near_field = NearField(self.grid, self._clearance_cost)
         c, min_reach_m = self.config, 0.0
         for _ in range(_TRIES):
-            with self._near_field.between(
-                goal_pose, start_pose, weight, self._seed, c.max_approach_m, self._bound_m, min_reach_m
-            ) as found:
+            with self._near_field.between(goal_pose, start_pose, min_reach_m) as found:
                 if found.cost is None:
                     return Route("NO_PATH") if found.unreachable else self.plan_target(goal_pose, start_pose)[0]
                 cells, moves = self.grid.arrays, self.grid.moves
@@ -227,7 +226,7 @@ class Planner:
         finally:
             self._cost, self._fields = self._scratch, FieldCache(0, 0)
 
-    def cost_to_go(self, points: ArrayLike) -> NDArray[np.float64]:
+    def cost_to_go(self, points: ArrayLike) -> Floats:
         """Cost-to-go of points, (n, 3) float metres; (n,) float64 metres.
 
         It is that of the last goal of `plan_target` or `estimate_routes`.
@@ -235,50 +234,45 @@ class Planner:
         p = np.ascontiguousarray(np.asarray(points, np.float64).reshape(-1, 3))
         return np.asarray(costs_at(p, self.grid.arrays, self._cost))
 
-    def _blocked(self, start: NDArray[np.float64]) -> bool:
+    def _blocked(self, start: Floats) -> bool:
         # All goals of a scene share its anchors as starts.
         key = start[:3].tobytes()
         if key not in self._blocked_starts:
             self._blocked_starts[key] = self.grid.in_collision(start[:3])
         return self._blocked_starts[key]
 
-    def _expand(self, goal: NDArray[np.float64]) -> None:
+    def _expand(self, goal: Floats) -> None:
         cached = self._fields.find(goal.tobytes(), self._scratch)
         if cached is not None:
             self._cost = cached
             return
-        self._cost = self._scratch
-        self._cost.fill(np.inf)
-        expand_cost(
-            self._seed(goal, self._cost), self._order, self._bound_m, self.grid.arrays.cell, self.grid.moves,
-            self._cost, self._clearance_cost,
+        approach_m = self.config.max_approach_m
+        self._cost = cost_to_go(
+            goal, self.grid, approach_m, self._bound_m, self._longest_m + 2 * approach_m, self._prefer_on_grid,
+            self._clearance_cost, self._scratch,
         )  # fmt: skip
         self._fields.store(goal.tobytes(), self._cost)
 
-    @property
-    def _bound_m(self) -> float:
-        c = self.config
-        return c.max_length_m * c.length_slack + _EXTRA_M * c.clearance_weight
-
-    def _seed(self, goal: NDArray[np.float64], cost: NDArray[np.float32]) -> NDArray[np.int32]:
+    @cached_property
+    def _near_field(self) -> NearField:
         c, g = self.config, self.grid
-        # A route's final heading is up to half a turn off the goal's yaw, so the grid's Approach may be too.
-        angle = min(math.radians(c.max_approach_angle_deg) + TURN_RAD / 2, math.pi)
-        prefer = self._prefer._replace(ahead_cos=math.cos(angle))
-        return np.asarray(seed_goal(*goal, c.max_approach_m, g.radius_m, g.arrays, g.moves, cost, prefer))
 
-    def _estimate(self, start: NDArray[np.float64], goal: NDArray[np.float64], value: float) -> Route:
-        c = self.config
-        if not value <= c.max_length_m * c.length_slack:
+        def seed(goal: Floats, cost: Singles) -> Int32s:
+            prefer = self._prefer_on_grid
+            return np.asarray(seed_goal(*goal, c.max_approach_m, g.radius_m, g.arrays, g.moves, cost, prefer))
+
+        return NearField(g, self._clearance_cost, c.ladder[0].weight, c.max_approach_m, self._bound_m, seed)
+
+    def _estimate(self, start: Floats, goal: Floats, value: float) -> Route:
+        if not value <= self._longest_m:
             return Route("NO_PATH")
         # The grid path is collision-free, so the shortest route is no longer: `filter` would reject the task.
-        straight = value * _INTERPOLATION < c.min_detour_ratio * math.dist(goal[:3], start[:3])
+        straight = value * _INTERPOLATION < self.config.min_detour_ratio * math.dist(goal[:3], start[:3])
         return Route("NEAR_STRAIGHT" if straight else "NOT_NEEDED", cost_to_go_m=value)
 
     def _search(
-        self, start: NDArray[np.float64], goal: NDArray[np.float64], value: float, cost: NDArray[np.float32],
-        ladder: tuple[SearchAttempt, ...],
-    ) -> Route:  # fmt: skip
+        self, start: Floats, goal: Floats, value: float, cost: Singles, ladder: tuple[SearchAttempt, ...]
+    ) -> Route:
         c, g = self.config, self.grid
         heading = nearest_heading(float(start[3]), float(goal[3]))
         expansions = 0
@@ -307,7 +301,7 @@ class Planner:
         return Route(outcome, expansions=expansions, cost_to_go_m=value, attempts=len(ladder))
 
 
-def _poses(goal: ArrayLike, starts: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _poses(goal: ArrayLike, starts: ArrayLike) -> tuple[Floats, Floats]:
     return np.asarray(goal, np.float64), np.asarray(starts, np.float64).reshape(-1, 4)
 
 

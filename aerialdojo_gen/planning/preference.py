@@ -10,9 +10,10 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aerialdojo_gen.base.kernels import njit
+from aerialdojo_gen.geometry.arrays import Singles
+from aerialdojo_gen.planning.grid_kernels import GridArrays
 
 # Step of the integration of clearance cost: the grid's cells are half a metre.
 _STEP_M = 0.5
@@ -33,7 +34,7 @@ class Preference(NamedTuple):
 NO_PREFERENCE = Preference(1.0, 0.0, -1.0, 0.0)
 
 
-def clearance_cost_field(field: NDArray[np.float32], prefer: Preference) -> NDArray[np.float32]:
+def clearance_cost_field(field: Singles, prefer: Preference) -> Singles:
     """Extra cost of a metre in each cell near surfaces, (nx, ny, nz) float32, multiples of `CLEARANCE_COST_UNIT`."""
     share = np.float32(1.0) - np.clip(field, 0.0, prefer.clearance) / np.float32(prefer.clearance)
     units = np.rint(share * np.float32(prefer.weight / CLEARANCE_COST_UNIT))
@@ -41,9 +42,7 @@ def clearance_cost_field(field: NDArray[np.float32], prefer: Preference) -> NDAr
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def _clearance(
-    x: float, y: float, z: float, ox: float, oy: float, oz: float, cell: float, field: NDArray[np.float32]
-) -> float:  # fmt: skip
+def _clearance(x: float, y: float, z: float, ox: float, oy: float, oz: float, cell: float, field: Singles) -> float:
     """Distance of a point to the nearest surface, trilinear between cells; metres."""
     nx, ny, nz = field.shape
     fx = min(max((x - ox) / cell - 0.5, 0.0), nx - 1.0)
@@ -64,7 +63,7 @@ def _clearance(
 @njit(cache=True, error_model="numpy")
 def clearance_penalty(
     px: float, py: float, pz: float, qx: float, qy: float, qz: float, clearance: float, weight: float,
-    ox: float, oy: float, oz: float, cell: float, field: NDArray[np.float32],
+    ox: float, oy: float, oz: float, cell: float, field: Singles,
 ) -> float:  # fmt: skip
     """Extra cost, metres, of a straight segment for low clearance."""
     dx, dy, dz = qx - px, qy - py, qz - pz
@@ -84,6 +83,17 @@ def clearance_penalty(
             # Clearance is 1-Lipschitz: skip as far as it must stay above the preferred one.
             t = max(t, m - lack)
     return weight * total / clearance
+
+
+@njit(cache=True, inline="always")
+def leg_penalty(
+    px: float, py: float, pz: float, qx: float, qy: float, qz: float, prefer: Preference, grid: GridArrays
+) -> float:
+    """`clearance_penalty` outside of inner loops, where passing tuples of arrays costs more than the work."""
+    return clearance_penalty(
+        px, py, pz, qx, qy, qz, prefer.clearance, prefer.weight,
+        grid.origin[0], grid.origin[1], grid.origin[2], grid.cell, grid.field,
+    )  # fmt: skip
 
 
 @njit(cache=True, inline="always")

@@ -7,9 +7,9 @@ fewer turns.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aerialdojo_gen.base.kernels import njit
+from aerialdojo_gen.geometry.arrays import Ints
 from aerialdojo_gen.geometry.motion import N_HEADINGS, QUARTER
 
 # A translation is direction * 3 + step for the horizontal ones, then up 1 and 2 m, down 1 and 2 m.
@@ -35,7 +35,7 @@ def wrap_heading(heading: int) -> int:
     return heading + N_HEADINGS if heading < 0 else heading
 
 
-def _best_headings() -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _best_headings() -> tuple[Ints, Ints]:
     """Turns to the best heading for every direction relative to the heading, and their number; ahead wins ties."""
     by, count = np.zeros(N_HEADINGS, np.int64), np.zeros(N_HEADINGS, np.int64)
     for direction in range(N_HEADINGS):
@@ -49,44 +49,25 @@ def _best_headings() -> tuple[NDArray[np.int64], NDArray[np.int64]]:
 TURN_BY, N_TURNS = _best_headings()
 
 
-@njit(cache=True)
-def append_legs(
-    moves: NDArray[np.int8], directions: NDArray[np.int64], metres: NDArray[np.int64]
-) -> NDArray[np.int8]:  # fmt: skip
-    """Append the fewest translations that fly some legs."""
-    found = np.empty(len(moves) + metres.sum(), np.int8)
-    n = len(moves)
-    found[:n] = moves
-    for i in range(len(metres)):
-        left = metres[i]
-        vertical = directions[i] >= N_HEADINGS
-        while left > 0:
-            if vertical:
-                step = 1 if left >= 2 else 0
-                found[n] = N_FLAT + step + (0 if directions[i] == UP else 2)
-                left -= step + 1
-            else:
-                step = 2 if left >= 5 else (1 if left >= 3 else 0)
-                found[n] = directions[i] * N_STEPS + step
-                left -= 2 * step + 1
-            n += 1
-    return found[:n].copy()
+@njit(cache=True, inline="always")
+def fewest_moves(direction: int, metres: int) -> int:
+    """Fewest moves that fly a leg."""
+    if direction >= N_HEADINGS:
+        return (metres + 1) // 2
+    rest = metres % 5
+    return metres // 5 + rest // 3 + rest % 3
 
 
 @njit(cache=True, error_model="numpy")
-def count_actions(
-    heading: int, goal_heading: int, directions: NDArray[np.int64], metres: NDArray[np.int64]
-) -> int:  # fmt: skip
+def count_actions(heading: int, goal_heading: int, directions: Ints, metres: Ints) -> int:
     """Number of actions of legs, with the turns before, between and after them and an Approach."""
     count = 1
     for i in range(len(metres)):
         if metres[i] == 0:
             continue
+        count += fewest_moves(directions[i], metres[i])
         if directions[i] >= N_HEADINGS:
-            count += (metres[i] + 1) // 2
             continue
-        rest = metres[i] % 5
-        count += metres[i] // 5 + rest // 3 + rest % 3
         relative = wrap_heading(directions[i] - heading)
         count, heading = count + N_TURNS[relative], wrap_heading(heading + TURN_BY[relative] - N_HEADINGS)
     return count + turns_between(heading, goal_heading)

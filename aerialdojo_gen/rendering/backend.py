@@ -16,10 +16,10 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aerialdojo_gen.base.config.sections import RENDERERS, RendererName
 from aerialdojo_gen.base.errors import RenderError
+from aerialdojo_gen.geometry.arrays import Floats
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.rendering.picture import Renderer
@@ -166,6 +166,6 @@ def _box(
             x, y, z = (ends[bit, axis] for axis, bit in enumerate(bits))
             vertices.append((x + lean * bits[2], y, z))
         faces += [(4 * k, 4 * k + 1, 4 * k + 2), (4 * k, 4 * k + 2, 4 * k + 3)]
-    at: NDArray[np.float64] = np.array(vertices)
+    at: Floats = np.array(vertices)
     uv = (at[:, :2] + at[:, 2:]).astype(np.float32) / np.float32(2.0)
     return Instance(node, "probe", "", {}, (Part(at, np.array(faces, dtype=np.int32), uv, material),))

@@ -6,10 +6,11 @@ import itertools
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from aerialdojo_gen.base import rng
 from aerialdojo_gen.base.errors import StoreError
+from aerialdojo_gen.geometry.arrays import Flags, Floats
 from aerialdojo_gen.geometry.rays import RayCaster, TriangleRayCaster
 from aerialdojo_gen.geometry.soup import soup
 from aerialdojo_gen.geometry.surface import Surface
@@ -27,8 +28,6 @@ def ray_caster(scene: Scene) -> RayCaster:
     return context_of(scene).part("ray caster", lambda: RayCaster(scene, triangle_caster(scene)))
 
 
-Floats = NDArray[np.float64]
-
 # A target of which only 0.4 % is visible is found by chance; most visible ones are hit by the first few rays.
 _POINTS = 256
 _ROUNDS = (0, 1, 4, 16, _POINTS)
@@ -40,7 +39,7 @@ def in_sight(scene: Scene, node: str, position: ArrayLike) -> bool:
     return bool(all_in_sight(scene, [node], np.asarray(position, dtype=np.float64)[None])[0])
 
 
-def all_in_sight(scene: Scene, nodes: Sequence[str], positions: Floats) -> NDArray[np.bool_]:
+def all_in_sight(scene: Scene, nodes: Sequence[str], positions: Floats) -> Flags:
     """For n nodes and positions (n, 3), world metres: whether each is in sight; (n,) bool."""
     seen = np.zeros(len(nodes), dtype=np.bool_)
     if not len(nodes):

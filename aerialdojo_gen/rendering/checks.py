@@ -21,17 +21,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.base.kernels import njit
+from aerialdojo_gen.geometry.arrays import Bytes, Floats, Ints
 from aerialdojo_gen.geometry.cameras import Camera
-from aerialdojo_gen.geometry.rays import TriangleRayCaster
 from aerialdojo_gen.geometry.soup import soup
-from aerialdojo_gen.rendering.casters import triangle_caster
 from aerialdojo_gen.rendering.codecs import MAX_DEPTH_M
 from aerialdojo_gen.rendering.picture import NEAR_M, Picture
 from aerialdojo_gen.rendering.texels import masked_caster
 from aerialdojo_gen.scenes.context import context_of
 from aerialdojo_gen.scenes.model import Scene
-
-Floats = NDArray[np.float64]
 
 FLAGS = ("missing", "black", "uniform", "frozen", "depth_invalid", "depth_mismatch", "camera_inside")
 DEPTH_FLAGS = frozenset({"missing", "depth_invalid", "depth_mismatch", "camera_inside"})
@@ -89,8 +86,7 @@ class ViewChecks:
     def compare_with_rays(self, picture: Picture, world_from_camera: Floats) -> tuple[float, float]:
         """Compare depth with ray casts at a lattice of smooth pixels: share that differs, share hit from behind."""
         h, w = picture.depth_m.shape
-        n = _SAMPLES_A_SIDE
-        rows, cols = _samples(h, w, n)
+        rows, cols = _samples(h, w)
         depth = picture.depth_m
         measured = depth[rows, cols].astype(np.float64)
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -118,14 +114,14 @@ class ViewChecks:
 class Solid:
     """Ray casts that distinguish front faces from back faces."""
 
-    def __init__(self, scene: Scene, caster: TriangleRayCaster | None = None) -> None:
+    def __init__(self, scene: Scene) -> None:
         vertices, faces = soup(scene.instances)
         corners = vertices[faces]
         self._normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         # Double-sided surfaces have no inside.
         both = [scene.materials[p.material].double_sided for i in scene.instances for p in i.parts]
         self._normal[np.repeat(both, [len(p.faces) for i in scene.instances for p in i.parts])] = 0.0
-        self._caster = masked_caster(scene, caster or TriangleRayCaster(vertices, faces))
+        self._caster = masked_caster(scene)
 
     def first_hit(self, origin: Floats, directions: Floats) -> tuple[Floats, float]:
         """First hits of rays, (n,) metres, and the share of hits from behind: near 1 inside a solid."""
@@ -137,7 +133,7 @@ class Solid:
 
 def scene_solid(scene: Scene) -> Solid:
     """Return the scene's solid, over its one Embree scene."""
-    return context_of(scene).part("solid", lambda: Solid(scene, triangle_caster(scene)))
+    return context_of(scene).part("solid", lambda: Solid(scene))
 
 
 def picture_flags(picture: Picture) -> set[str]:
@@ -157,7 +153,7 @@ def picture_flags(picture: Picture) -> set[str]:
 
 
 @njit(cache=True)
-def _darkness(rgb: NDArray[np.uint8]) -> tuple[float, int]:
+def _darkness(rgb: Bytes) -> tuple[float, int]:
     """Share of black pixels and widest range of a colour, of every fourth pixel each way."""
     least_red = least_green = least_blue = np.uint8(255)
     most_red = most_green = most_blue = np.uint8(0)
@@ -180,10 +176,8 @@ def _equal(one: NDArray[Any], other: NDArray[Any]) -> bool:
 
 
 @lru_cache
-def _samples(height: int, width: int, a_side: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    rows, cols = np.meshgrid(_lattice(height, a_side), _lattice(width, a_side), indexing="ij")
+def _samples(height: int, width: int) -> tuple[Ints, Ints]:
+    """Rows and columns of a lattice of pixels within a picture's border."""
+    lattices = (np.unique(np.linspace(1, n - 2, _SAMPLES_A_SIDE + 2)[1:-1].astype(np.int64)) for n in (height, width))
+    rows, cols = np.meshgrid(*lattices, indexing="ij")
     return rows.ravel(), cols.ravel()
-
-
-def _lattice(n: int, k: int) -> NDArray[np.int64]:
-    return np.unique(np.linspace(1, n - 2, k + 2)[1:-1].astype(np.int64))

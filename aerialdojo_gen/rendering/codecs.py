@@ -8,6 +8,7 @@ none. All writers give the same bytes for the same frames.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager
 from fractions import Fraction
 from functools import lru_cache
 from pathlib import Path
@@ -21,6 +22,7 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.base.kernels import njit
 from aerialdojo_gen.base.pictures import FRAME_PNG, encode_png
+from aerialdojo_gen.geometry.arrays import Bytes, Int32s, Singles
 
 MAX_DEPTH_M = 65.535
 RGB_CODEC, DEPTH_CODEC = "h264", "ffv1"
@@ -52,7 +54,7 @@ def _round(depth_m: NDArray[Any], millimetres_a_metre: Any, out: NDArray[np.uint
         out[k] = np.uint16(mm) if 0.0 <= mm <= 65535.0 else np.uint16(0)
 
 
-def to_metres(stored: NDArray[np.uint16], step: float = 0.0) -> NDArray[np.float32]:
+def to_metres(stored: NDArray[np.uint16], step: float = 0.0) -> Singles:
     """Depth in metres from stored values, float32; inf for out of range."""
     if step:
         return stored_depths_m(step)[stored]
@@ -60,7 +62,7 @@ def to_metres(stored: NDArray[np.uint16], step: float = 0.0) -> NDArray[np.float
 
 
 @lru_cache
-def stored_depths_m(step: float) -> NDArray[np.float32]:
+def stored_depths_m(step: float) -> Singles:
     """Depths of the stored values of a relative step, (65536,) m: 0.1 * (1 + step) ** (value - 1); inf for 0."""
     values = np.arange(1 << 16, dtype=np.float64)
     with np.errstate(over="ignore"):
@@ -78,7 +80,7 @@ def _steps(step: float) -> NDArray[np.uint16]:
     return values
 
 
-class VideoWriter:
+class VideoWriter(AbstractContextManager["VideoWriter"]):
     """Write video streams (H.264 RGB, 16-bit depth, instance ids) into one file, by frames; a context manager."""
 
     def __init__(
@@ -104,7 +106,7 @@ class VideoWriter:
             stream.codec_context.thread_count = 1
             self._streams[modality] = stream
 
-    def write(self, frames: Mapping[str, NDArray[np.uint8] | NDArray[np.uint16]]) -> None:
+    def write(self, frames: Mapping[str, Bytes | NDArray[np.uint16]]) -> None:
         """Append a frame to every stream, by modality."""
         for modality, stream in self._streams.items():
             for packet in stream.encode(_frame(modality, frames[modality])):
@@ -117,10 +119,6 @@ class VideoWriter:
                 self._container.mux(packet)
         self._container.close()
 
-    def __enter__(self) -> VideoWriter:
-        """Return itself."""
-        return self
-
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
@@ -131,7 +129,7 @@ class VideoWriter:
             self._container.close()
 
 
-def _frame(modality: str, picture: NDArray[np.uint8] | NDArray[np.uint16]) -> Any:
+def _frame(modality: str, picture: Bytes | NDArray[np.uint16]) -> Any:
     """Copy a picture into a frame of its codec's format; ValueError where it does not fit one."""
     height, width = picture.shape[:2]
     if modality == "rgb":
@@ -156,9 +154,7 @@ def _plane(frame: Any, k: int, dtype: type[np.uint8] | type[np.uint16]) -> NDArr
 
 
 @njit(cache=True, error_model="numpy")
-def _to_yuv(
-    rgba: NDArray[np.int32], y: NDArray[np.uint8], u: NDArray[np.uint8], v: NDArray[np.uint8]
-) -> None:  # fmt: skip
+def _to_yuv(rgba: Int32s, y: Bytes, u: Bytes, v: Bytes) -> None:
     """Convert by BT.601, limited range, chroma the mean of four pixels, in integers: the same on every machine."""
     for r in range(rgba.shape[0]):
         for c in range(rgba.shape[1]):
@@ -184,23 +180,14 @@ def _to_yuv(
 
 
 class PngWriter:
-    """Write frames as loose PNG files, ``000000.png`` and on; a context manager."""
+    """Write frames as loose PNG files, ``000000.png`` and on."""
 
     def __init__(self, folder: Path, modality: str, comment: str = "") -> None:
         self._folder, self._modality, self._n = folder, modality, 0
         folder.mkdir()
         (folder / "camera.json").write_text(comment or "{}", encoding="utf-8")
 
-    def write(self, frames: Mapping[str, NDArray[np.uint8] | NDArray[np.uint16]]) -> None:
+    def write(self, frames: Mapping[str, Bytes | NDArray[np.uint16]]) -> None:
         """Append the modality's frame: (H, W, 3) uint8 RGB, or (H, W) uint16."""
         (self._folder / f"{self._n:06}.png").write_bytes(encode_png(frames[self._modality], FRAME_PNG))
         self._n += 1
-
-    def __enter__(self) -> PngWriter:
-        """Return itself."""
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """Do nothing: every frame is a file of its own."""

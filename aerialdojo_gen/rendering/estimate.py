@@ -12,7 +12,7 @@ from aerialdojo_gen.base import rng
 from aerialdojo_gen.base.config.sections import RenderConfig
 from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.rendering.backend import choose_renderer, open_renderer
-from aerialdojo_gen.rendering.checks import Solid
+from aerialdojo_gen.rendering.checks import scene_solid
 from aerialdojo_gen.rendering.placement import places
 from aerialdojo_gen.rendering.recording import frame_poses, record_views
 from aerialdojo_gen.rendering.sample import choose_trajectories, routes
@@ -107,7 +107,7 @@ def _measure(
     started = time.process_time()
     row = store.read_scene(data, "scenes", scene).to_pylist()[0]
     mesh = read_scene_mesh(open_root(data), row["mesh_path"], row["mesh_sha256"])
-    solid = Solid(mesh)
+    solid = scene_solid(mesh)
     short = route | {name: route[name][:_MEASURED_POSES] for name in ("x_m", "y_m", "z_m", "yaw_rad", "action")}
     poses = frame_poses(short, config)
     with open_renderer(mesh, renderer_name) as renderer, scratch_folder() as folder:

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from aerialdojo_gen.base.pictures import GALLERY_JPEG, SMALLEST_PNG, decode_rgb, encode_jpeg, encode_png
 from aerialdojo_gen.base.rng import generator
+from aerialdojo_gen.geometry.arrays import Bytes, Floats
 from aerialdojo_gen.geometry.cameras import Camera, look_at_pose
 from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.rendering.backend import scene_renderer
@@ -30,15 +31,13 @@ Image = NDArray[np.uint8]
 
 def look_at(
     scene: Scene, eye: ArrayLike, target: ArrayLike, width: int = 640, height: int = 480, fov_deg: float = 60.0
-) -> NDArray[np.uint8]:
+) -> Bytes:
     """Take a picture of a scene from `eye` to `target`, world metres; (height, width, 3) uint8 sRGB."""
     camera = Camera(width, height, fov_deg)
     return scene_renderer(scene, "auto").render(camera, look_at_pose(eye, target)).rgb
 
 
-def contact_sheet(
-    images: Sequence[NDArray[np.uint8]], labels: Sequence[str] = (), columns: int = 4
-) -> NDArray[np.uint8]:
+def contact_sheet(images: Sequence[Bytes], labels: Sequence[str] = (), columns: int = 4) -> Bytes:
     """Put pictures, (H, W, 3) uint8, side by side under their labels."""
     if not images or (labels and len(labels) != len(images)):
         raise ValueError(f"a sheet of {len(images)} pictures with {len(labels)} labels")
@@ -144,7 +143,7 @@ def _scene_pictures(
     ]
 
 
-def _flying_views(scene: Scene) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+def _flying_views(scene: Scene) -> list[tuple[Floats, Floats]]:
     """Two views among the objects, one from each half of the scene: low places with a long line of sight."""
     low, high = scene.bounds
     caster = RayCaster(scene)

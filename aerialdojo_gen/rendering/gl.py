@@ -6,36 +6,37 @@ import ctypes.util
 import importlib
 import os
 import threading
+from collections import deque
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
+from itertools import groupby
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.base.errors import RenderError
+from aerialdojo_gen.geometry.arrays import Bytes, Floats, Int32s, Singles
 from aerialdojo_gen.geometry.cameras import Camera
 from aerialdojo_gen.rendering import gl_programs
 from aerialdojo_gen.rendering import gl_shaders as glsl
-from aerialdojo_gen.rendering.bodies import GlBodies
-from aerialdojo_gen.rendering.gl_foreign import backdrop_kinds, foreign_kinds
-from aerialdojo_gen.rendering.gl_geometry import Kind, own_kinds
-from aerialdojo_gen.rendering.gl_target import clear_depth, read_picture
-from aerialdojo_gen.rendering.gl_tiles import Tiles
+from aerialdojo_gen.rendering.gl_geometry import Kind, backdrop_kinds, foreign_kinds, own_kinds
+from aerialdojo_gen.rendering.gl_programs import clear_depth, read_pixels
 from aerialdojo_gen.rendering.lighting import cloud_map, height_map, light_of, sun_view
 from aerialdojo_gen.rendering.picture import FAR_M, NEAR_M, Picture, Renderer
 from aerialdojo_gen.rendering.shading import SIDE
 from aerialdojo_gen.scenes.light import Light
 from aerialdojo_gen.scenes.model import Scene
 
-Floats = NDArray[np.float64]
-
 _HINT = "install moderngl (pip install 'aerialdojo-gen[gl]') and Mesa (Debian: libegl1 libgl1 libgl1-mesa-dri)"
 
 
 # Uniforms that change with every picture.
 _PER_PICTURE = ("clip_from_world", "eye", "focal_px", "world_from_camera", "reach")
+
+# Pictures that are culled together at most, and that are drawn before the first of them is read.
+_GROUP, _AHEAD = 16, 4
 
 # A context is valid only in the thread that made it.
 _thread = threading.local()
@@ -93,10 +94,9 @@ class GlRenderer(Renderer):
         self._owned: list[Any] = []
         self._arrays: dict[tuple[tuple[str, ...], int], tuple[Any, dict[str, Any]]] = {}
         self._targets: dict[tuple[int, int, bool, int], Any] = {}
-        self._bodies: GlBodies | None = None
         kinds = [*own_kinds(scene), *foreign_kinds(scene)]
         shared: dict[int, Any] = {}
-        self._sets = [_DrawSet(kind, self, shared) for kind in kinds if len(kind.chunks.low)]
+        self._sets = [_DrawSet(kind, self, shared) for kind in kinds]
         self._backdrop = [_DrawSet(kind, self, shared) for kind in backdrop_kinds(scene)]
         self._indices = self._own(self._gl.buffer(reserve=4, dynamic=True))
         self._scene = scene
@@ -181,31 +181,30 @@ class GlRenderer(Renderer):
         """Take a picture; see `Renderer`."""
         return self.render_views(camera, [world_from_camera], instances)[0]
 
-    def render_views(self, camera: Camera, poses: Sequence[Floats], instances: bool = False) -> list[Picture]:
-        """Take several pictures; cheaper than one by one where they share their eye."""
-        clips = np.stack([clip_from_world(camera, pose, NEAR_M, FAR_M) for pose in poses])
-        eyes: dict[bytes, list[int]] = {}
-        for v, pose in enumerate(poses):
-            eyes.setdefault(pose[:3, 3].tobytes(), []).append(v)
-        visible: list[list[NDArray[np.uint32]]] = [[] for _ in poses]
-        for views in eyes.values():
-            eye = np.ascontiguousarray(poses[views[0]][:3, 3])
-            tiles = Tiles.empty(len(views), camera.width, camera.height)
-            for drawn in self._sets:
-                found = drawn.kind.chunks.visible_indices(clips[views], eye, tiles, drawn.kind.hides)
-                for v, indices in zip(views, found, strict=True):
-                    visible[v].append(indices)
-        # One target for all views, for the processor's cache.
-        return [
-            read_picture(self.draw_triangles(camera, pose, clip, chosen, instances), camera, instances)
-            for clip, pose, chosen in zip(clips, poses, visible, strict=True)
-        ]
+    def render_into(
+        self, camera: Camera, poses: Sequence[Floats], rgb: Bytes, depth_m: Singles, instance: Int32s | None
+    ) -> None:
+        """Take pictures into arrays: neighbours that share their eye are culled together; see `Renderer`."""
+        waiting: deque[tuple[Any, int]] = deque()
 
-    def bodies(self) -> GlBodies:
-        """Return the batch renderer of many small pictures."""
-        if self._bodies is None:
-            self._bodies = GlBodies(self)
-        return self._bodies
+        def read(left: int) -> None:
+            """Read the oldest pictures, later ones being drawn already: so OpenGL is not waited for."""
+            while len(waiting) > left:
+                target, k = waiting.popleft()
+                read_pixels(target, rgb[k], depth_m[k], None if instance is None else instance[k])
+
+        # In groups that bound the memory of a body that hovers.
+        for _, group in groupby(range(len(poses)), lambda k: (k // _GROUP, poses[k][:3, 3].tobytes())):
+            numbers = list(group)
+            own = [poses[k] for k in numbers]
+            clips = np.stack([clip_from_world(camera, pose, NEAR_M, FAR_M) for pose in own])
+            eye, nearness = own[0][:3, 3].copy(), np.zeros((len(own), *depth_m.shape[1:]), np.float32)
+            visible = [d.kind.chunks.visible_indices(clips, eye, nearness, d.kind.hides) for d in self._sets]
+            for k, pose, clip, *chosen in zip(numbers, own, clips, *visible, strict=True):
+                slot = k % (_AHEAD + 1)
+                waiting.append((self.draw_triangles(camera, pose, clip, chosen, instance is not None, slot), k))
+                read(_AHEAD)
+        read(0)
 
     def draw_triangles(
         self, camera: Camera, world_from_camera: Floats, clip: Floats, visible: Sequence[NDArray[np.uint32]],
@@ -305,7 +304,7 @@ class GlRenderer(Renderer):
             resource = self._owned.pop()
             if getattr(_thread, "context", None) is self._gl:
                 resource.release()
-        self._arrays, self._targets, self._bodies = {}, {}, None
+        self._arrays, self._targets = {}, {}
 
 
 class _DrawSet:

@@ -7,30 +7,26 @@ so that hidden ones fail the depth test early.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache, reduce
+from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.base.kernels import njit
+from aerialdojo_gen.geometry.arrays import Bytes, Floats, Ints, Singles
 from aerialdojo_gen.geometry.soup import soup
 from aerialdojo_gen.geometry.triangles import morton_codes
-from aerialdojo_gen.rendering.gl_culling import chunks_in_view, triangles_in_view
-from aerialdojo_gen.rendering.gl_tiles import Tiles
+from aerialdojo_gen.rendering.gl_culling import CHUNK_TRIANGLES, visible_triangles
 from aerialdojo_gen.rendering.lighting import is_fine, is_shiny, texel_m
 from aerialdojo_gen.rendering.shading import MUTE, muted
-from aerialdojo_gen.scenes.model import HORIZON, Material, Part, Scene
+from aerialdojo_gen.scenes.model import HORIZON, Instance, Material, Part, Scene
 from aerialdojo_gen.scenes.noise import fractal, texture_rng
 from aerialdojo_gen.scenes.textures_natural import NATURAL
 
-Floats = NDArray[np.float64]
-Singles = NDArray[np.float32]
-Indices = NDArray[np.int64]
-
-CHUNK_TRIANGLES = 96
 _LARGEST_TEXTURE = 512
 _FINE = "FINE"  # Tag of what has a texture larger than most
 _MORTON_BITS = 16
@@ -58,22 +54,19 @@ class Chunks:
     """Triangles of one kind of surface (with a texture, or without), cut into chunks."""
 
     vertices: NDArray[np.void]  # (3 n,) structured array of `VERTEX`; n triangles, chunk after chunk
-    starts: NDArray[np.int64]  # (k + 1,) int64; first triangle of every chunk; the last is n
+    starts: Ints  # (k + 1,) int64; first triangle of every chunk; the last is n
     low: Floats  # (k, 3) float64; a chunk's box, metres, world frame
     high: Floats
-    planes: Floats  # (n, 4) float64; a triangle faces the eye where ``normal . eye + d`` is positive
-    corners: NDArray[np.float32]  # (n, 9) float32
+    planes: Floats  # (k, 4 * 96) float64; a triangle faces the eye where ``normal . eye + d`` is positive
+    corners: Singles  # (k, 9 * 96) float32
 
-    def visible_indices(
-        self, clips: Floats, eye: Floats, tiles: Tiles, hides: bool = True
-    ) -> list[NDArray[np.uint32]]:
-        """Vertex indices (3 k,) per view of one eye, by chunk, nearest first."""
-        order, in_view = chunks_in_view(self.low, self.high, eye, clips)
-        indices, count = triangles_in_view(
-            order, in_view, self.starts, self.planes, self.corners, clips, eye, self.low, self.high, hides,
-            tiles.width, tiles.height, tiles.whole, tiles.part, tiles.covered,
-        )  # fmt: skip
-        return [row[:n] for row, n in zip(indices, count, strict=True)]
+    def visible_indices(self, clips: Floats, eye: Floats, nearness: Singles, hides: bool) -> list[NDArray[np.uint32]]:
+        """Vertex indices of every view of one eye, nearest first; what hides raises `nearness` (views, H, W)."""
+        out = np.empty((len(clips), len(self.vertices)), np.uint32)
+        counts = visible_triangles(
+            self.starts, self.low, self.high, self.planes, self.corners, hides, clips, eye, nearness, out
+        )
+        return [row[:n] for row, n in zip(out, counts.tolist(), strict=True)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +75,7 @@ class Kind:
 
     chunks: Chunks
     tags: tuple[str, ...]  # Variant of the program (`aerialdojo_gen.rendering.gl_shaders.specialise`)
-    layers: NDArray[np.uint8] | None  # The layers of its texture array, first row at v = 0; None where it has none
+    layers: Bytes | None  # The layers of its texture array, first row at v = 0; None where it has none
     smooth: bool = False
     double_sided: bool = False  # Whether both sides are drawn
 
@@ -130,6 +123,7 @@ def own_kinds(scene: Scene) -> list[Kind]:
     return [
         Kind(cut(rows[kind_of == k]), tags, layers[_FINE in tags] if "TEXTURED" in tags else None)
         for tags, k in kinds.items()
+        if (kind_of == k).any()
     ]
 
 
@@ -142,7 +136,7 @@ def _tags(material: Material) -> tuple[str, ...]:
     return (*tags, "SHINY") if is_shiny(material) else tags
 
 
-def smooth(rows: NDArray[np.void], group: Indices, creases: Floats) -> None:
+def smooth(rows: NDArray[np.void], group: Ints, creases: Floats) -> None:
     """Give corners the mean normal of the faces about them that turn less than a crease from their own, in place.
 
     Rows (n, 3) of `VERTEX` belong to groups (n,), each with its crease; a group ends at its own corners, and rows of
@@ -154,7 +148,7 @@ def smooth(rows: NDArray[np.void], group: Indices, creases: Floats) -> None:
 
 
 @njit(cache=True)
-def _mean_normals(points: NDArray[np.uint32], normal: Singles, group: Indices, creases: Floats) -> Singles:
+def _mean_normals(points: NDArray[np.uint32], normal: Singles, group: Ints, creases: Floats) -> Singles:
     """Mean normals (n, 3) of corners, by the bits of their points."""
     found = normal.copy()
     size = 1024
@@ -198,11 +192,11 @@ def _mean_normals(points: NDArray[np.uint32], normal: Singles, group: Indices, c
 
 
 def is_foreign(part: Part, material: Material) -> bool:
-    """Whether a part is drawn by `aerialdojo_gen.rendering.gl_foreign`."""
+    """Whether a part is drawn as one of an imported mesh."""
     return material.foreign or part.colours is not None
 
 
-def packed(drawn: Sequence[tuple[Part, Material, int]]) -> tuple[NDArray[np.void], Indices]:
+def packed(drawn: Sequence[tuple[Part, Material, int]]) -> tuple[NDArray[np.void], Ints]:
     """Pack the triangles of parts that have an area, (n, 3) of `VERTEX`, and say which part each is of, (n,).
 
     Parts come with their material and the number of their instance; texel and layer are left at 0.
@@ -233,12 +227,7 @@ def packed(drawn: Sequence[tuple[Part, Material, int]]) -> tuple[NDArray[np.void
 
 
 def cut(triangles: NDArray[np.void], double_sided: bool = False) -> Chunks:
-    """Cut packed triangles into chunks; double-sided triangles face every eye."""
-    if not len(triangles):
-        none = np.zeros((0, 3))
-        return Chunks(
-            triangles.ravel(), np.zeros(1, dtype=np.int64), none, none, np.zeros((0, 4)), _positions(triangles)
-        )
+    """Cut packed triangles, at least one, into chunks; double-sided triangles face every eye."""
     corners = triangles["position"].astype(np.float64)
     # NumPy takes five times as long along an axis of three.
     low, high = (reduce(of, np.moveaxis(corners, 1, 0)) for of in (np.minimum, np.maximum))
@@ -249,32 +238,37 @@ def cut(triangles: NDArray[np.void], double_sided: bool = False) -> Chunks:
     triangles, corners = triangles[order], corners[order]
     starts = np.arange(0, len(triangles), CHUNK_TRIANGLES)
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    offset = -np.einsum("ij,ij->i", normal, corners[:, 0])
+    planes = np.column_stack([normal, -np.einsum("ij,ij->i", normal, corners[:, 0])])
+    if double_sided:
+        planes[:] = 0.0, 0.0, 0.0, 1.0
     return Chunks(
         triangles.ravel(),
         np.append(starts, len(triangles)),
         np.minimum.reduceat(low[order], starts),
         np.maximum.reduceat(high[order], starts),
-        np.tile([0.0, 0.0, 0.0, 1.0], (len(normal), 1)) if double_sided else np.column_stack([normal, offset]),
-        _positions(triangles),
+        _blocks(planes),
+        _blocks(triangles["position"].reshape(-1, 9)),
     )
 
 
-def _positions(triangles: NDArray[np.void]) -> NDArray[np.float32]:
-    return np.ascontiguousarray(triangles["position"].reshape(-1, 9), dtype=np.float32)
+def _blocks(rows: NDArray[Any]) -> NDArray[Any]:
+    """Lay triangles' rows out by chunk, field and triangle, for vectorised loops."""
+    padded = np.pad(rows, ((0, -len(rows) % CHUNK_TRIANGLES), (0, 0)))
+    blocks = padded.reshape(-1, CHUNK_TRIANGLES, rows.shape[1]).transpose(0, 2, 1)
+    return np.ascontiguousarray(blocks).reshape(len(blocks), -1)
 
 
 def _bases(names: list[str]) -> list[str]:
     return [name.split(":")[0] for name in names]
 
 
-def _layers(scene: Scene, names: list[str]) -> NDArray[np.uint8] | None:
+def _layers(scene: Scene, names: list[str]) -> Bytes | None:
     textures = [t for name in names if (t := scene.materials[name].texture) is not None]
     if not textures:
         return None
     largest = min(_LARGEST_TEXTURE, max(max(t.shape[:2]) for t in textures))
     edge = 1 << (largest - 1).bit_length()
-    layers: list[NDArray[np.uint8]] = []
+    layers: list[Bytes] = []
     for texture, base in zip(textures, _bases(names), strict=True):
         larger = max(texture.shape[:2]) > edge
         sized = cv2.resize(texture[::-1], (edge, edge), interpolation=cv2.INTER_AREA if larger else cv2.INTER_NEAREST)
@@ -290,3 +284,78 @@ def _layers(scene: Scene, names: list[str]) -> NDArray[np.uint8] | None:
 def _grain(edge: int) -> Floats:
     """Noise without a scale, tileable: what a material shows from afar, where its own pattern would be too large."""
     return fractal(edge, 6, 6, texture_rng("grain"), 0.75)
+
+
+# Fourth byte of the vertex colour of an unlit material.
+_UNLIT = 255
+_Key = tuple[int, int, bool, bool]
+
+
+def foreign_kinds(scene: Scene) -> list[Kind]:
+    """Pack the triangles that `own_kinds` leaves out."""
+    return _foreign(scene.instances, scene.materials, True, ("FOREIGN",))
+
+
+def backdrop_kinds(scene: Scene) -> list[Kind]:
+    """Pack sky domes: all materials, both sides."""
+    domes = [instance for instance in scene.backdrop if instance.surface != HORIZON]
+    # No light falls on a dome: its colours stay as vivid as they are.
+    unlit = {name: replace(material, unlit=True) for name, material in scene.materials.items()}
+    return _foreign(domes, unlit, False, ("FOREIGN", "BACKDROP"))
+
+
+def _foreign(
+    instances: Iterable[Instance], materials: dict[str, Material], foreign_only: bool, tags: tuple[str, ...]
+) -> list[Kind]:
+    drawn: dict[_Key, list[tuple[Part, Material, int]]] = {}
+    for k, instance in enumerate(instances):
+        for part in instance.parts:
+            material = materials[part.material]
+            if not foreign_only or is_foreign(part, material):
+                double_sided = material.double_sided or not foreign_only
+                key = (*_size(material), material.mask is not None, double_sided)
+                drawn.setdefault(key, []).append((part, material, k))
+    kinds = (_kind(key, drawn[key], tags) for key in sorted(drawn))
+    return [kind for kind in kinds if kind is not None]
+
+
+def _kind(key: _Key, drawn: list[tuple[Part, Material, int]], tags: tuple[str, ...]) -> Kind | None:
+    rows, part_of = packed(drawn)
+    if not len(rows):
+        return None
+    layer = {material.name: material for _, material, _ in drawn if material.texture is not None}
+    number = {name: k for k, name in enumerate(layer)}
+    unlit = np.array([_UNLIT if material.unlit else 0 for _, material, _ in drawn])
+    rows["colour"][..., 3] = unlit[part_of, None]
+    rows["layer"] = np.array([number.get(material.name, 0) for _, material, _ in drawn])[part_of, None]
+    return Kind(
+        cut(rows, double_sided=key[3]),
+        (*tags, *(("ATLAS",) if key[0] else ()), *(("MASK",) if key[2] else ())),
+        _foreign_layers(list(layer.values()), key) if key[0] else None,
+        smooth=True,
+        double_sided=key[3],
+    )
+
+
+def _size(material: Material) -> tuple[int, int]:
+    """Height and width of the layer that a texture gets: powers of two, so that few sizes serve all."""
+    if material.texture is None:
+        return 0, 0
+    height, width = material.texture.shape[:2]
+    return 1 << (height - 1).bit_length(), 1 << (width - 1).bit_length()
+
+
+def _foreign_layers(materials: list[Material], key: _Key) -> Bytes:
+    layers = np.empty((len(materials), key[0], key[1], 4 if key[2] else 3), dtype=np.uint8)
+    for k, material in enumerate(materials):
+        assert material.texture is not None
+        texture = material.texture if material.unlit else cv2.transform(material.texture, MUTE)
+        if material.mask is not None:
+            alpha = np.where(material.mask, 255, 0).astype(np.uint8)
+            # Fill holes with the mean colour, or filtering would give leaves dark edges.
+            filled = np.where(material.mask[..., None], texture, np.array(material.colour, dtype=np.uint8))
+            texture = np.dstack([filled, alpha])
+        if texture.shape[:2] != key[:2]:
+            texture = cv2.resize(texture, (key[1], key[0]), interpolation=cv2.INTER_LINEAR)
+        layers[k] = texture[::-1]
+    return layers

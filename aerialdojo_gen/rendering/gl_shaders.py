@@ -62,9 +62,9 @@ out vec2 v_uv;
 flat out float v_layer;
 #endif
 out vec3 v_ray;
-#ifdef HORIZON
 out vec3 v_light;
 flat out vec3 v_normal;
+#ifdef HORIZON
 out vec4 v_air;  // colour and thickness of the haze before it
 uniform vec3 horizon;
 uniform vec3 zenith;
@@ -73,8 +73,6 @@ uniform vec3 sun_rgb;
 uniform vec3 sky_rgb;
 uniform vec3 ground_rgb;
 #else
-out vec3 v_light;
-flat out vec3 v_normal;
 out vec4 v_sun;
 #endif
 #ifdef FOREIGN
@@ -148,13 +146,11 @@ in vec2 v_uv;
 flat in float v_layer;
 #endif
 in vec3 v_ray;
-#ifdef HORIZON
 in vec3 v_light;
 flat in vec3 v_normal;
+#ifdef HORIZON
 in vec4 v_air;
 #else
-in vec3 v_light;
-flat in vec3 v_normal;
 in vec4 v_sun;
 #endif
 #ifdef FOREIGN
@@ -173,16 +169,15 @@ void main() {
     vec3 base = v_colour;
     float facing = -dot(v_normal, v_ray) * nearness;
 #ifdef TEXTURED
+    float texels_2 = range_2 / (v_texture.y * max(facing, 0.02));
 #ifdef NATURAL
     // The next layer eight times as large, and again: ground has grain at every distance. By the square of the
     // texels a pixel, for a logarithm takes long.
-    float texels_2 = range_2 / (v_texture.y * max(facing, 0.02));
     vec3 at = texels_2 < 28.0 ? vec3(v_uv, v_texture.x)
         : vec3(v_uv * (texels_2 < 1800.0 ? 0.125 : 0.015625), v_texture.x + 1.0);
     vec3 grain = texture(textures, at).rgb;
     base += (grain - base) * max(1.0 - 0.016 * texels_2, GRAIN);
 #else
-    float texels_2 = range_2 / (v_texture.y * max(facing, 0.02));
     float keep = clamp((FADE * FADE - texels_2) * (1.0 / (FADE * FADE - 1.0)), 0.0, 1.0);
     base = mix(base, texture(textures, vec3(v_uv, v_texture.x)).rgb, keep);
 #endif

@@ -9,17 +9,15 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aerialdojo_gen.base.rng import generator
+from aerialdojo_gen.geometry.arrays import Bytes, Flags, Floats, Singles
 from aerialdojo_gen.geometry.cameras import Camera, look_at_pose
 from aerialdojo_gen.rendering.casters import triangle_caster
 from aerialdojo_gen.scenes.context import context_of
 from aerialdojo_gen.scenes.light import Light
 from aerialdojo_gen.scenes.model import Material, Scene
 from aerialdojo_gen.scenes.noise import fractal
-
-Floats = NDArray[np.float64]
 
 # Distance of the shadow map's sun, in radii of the scene: its rays are then within 5° of parallel.
 _SUN_RADII = 12.0
@@ -67,7 +65,7 @@ class Lighting:
 
     colour: Floats  # (n, 3) float64; the material's mean colour, 0-255
     texel_m: Floats  # (n,) float64
-    unlit: NDArray[np.bool_]  # (n,) bool; whether light is baked into the material's colours
+    unlit: Flags  # (n,) bool; whether light is baked into the material's colours
     shiny: Floats  # (n,) float64; whether the sky is mirrored, 0 or 1
     sun: Floats  # (3,) float64; unit vector towards the sun
     sun_rgb: Floats  # (3,) float64; light on a white surface, linear
@@ -133,7 +131,7 @@ def texel_m(material: Material) -> float:
 
 
 @lru_cache(maxsize=8)
-def cloud_map(scene: str) -> NDArray[np.uint8]:
+def cloud_map(scene: str) -> Bytes:
     """Thickness of the clouds, (256, 256) uint8, tileable: half of the sky is above 127."""
     draws = generator(0, "clouds", scene)
     lumps = fractal(_CLOUDS_PX, 4, 6, draws, 0.58)
@@ -142,7 +140,7 @@ def cloud_map(scene: str) -> NDArray[np.uint8]:
     return out
 
 
-NO_CLOUDS: NDArray[np.uint8] = np.zeros((1, 1), np.uint8)
+NO_CLOUDS: Bytes = np.zeros((1, 1), np.uint8)
 
 
 class HeightMap(NamedTuple):
@@ -152,7 +150,7 @@ class HeightMap(NamedTuple):
     south_m: float
     cell_m: float
     lowest_m: float
-    above: NDArray[np.uint8]  # (n, m) uint8; height above the lowest, in 255ths of `REACH_M`; rows run north
+    above: Bytes  # (n, m) uint8; height above the lowest, in 255ths of `REACH_M`; rows run north
 
     @classmethod
     def nowhere(cls) -> HeightMap:
@@ -186,11 +184,11 @@ class ShadowMap(NamedTuple):
 
     focal_px: float
     world_from_camera: Floats  # (4, 4) float64
-    depth_m: NDArray[np.float32]  # (n, n) float32; planar depth of the lit surfaces; inf where there is none
+    depth_m: Singles  # (n, n) float32; planar depth of the lit surfaces; inf where there is none
     bias_m: float  # How far from a surface its light is looked up, against self-shadowing: more than a texel
 
     @classmethod
-    def of(cls, camera: Camera, world_from_camera: Floats, depth_m: NDArray[np.float32]) -> ShadowMap:
+    def of(cls, camera: Camera, world_from_camera: Floats, depth_m: Singles) -> ShadowMap:
         """Take a depth picture from the sun."""
         hit = depth_m[np.isfinite(depth_m)]
         texel = float(hit.mean()) / camera.focal_px if len(hit) else 0.0

@@ -6,16 +6,14 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from aerialdojo_gen.geometry.arrays import Bytes, Floats
 from aerialdojo_gen.geometry.rays import TriangleRayCaster
 from aerialdojo_gen.geometry.soup import soup
-from aerialdojo_gen.rendering.casters import triangle_caster
-from aerialdojo_gen.rendering.texels import SurfaceTexels, masked_caster
+from aerialdojo_gen.rendering.texels import masked_caster, scene_texels
 from aerialdojo_gen.scenes.context import context_of
 from aerialdojo_gen.scenes.model import Material, Scene
-
-Floats = NDArray[np.float64]
 
 # A map's light, as shares of a colour: from everywhere, from above, from the sun's side, from the sun.
 _AMBIENT, _FROM_ABOVE, _FROM_SIDE, _SUN = 0.55, 0.11, 0.05, 0.47
@@ -52,11 +50,10 @@ class Plane:
 class OrthographicPictures:
     """Takes parallel projections of a scene."""
 
-    def __init__(self, scene: Scene, caster: TriangleRayCaster | None = None) -> None:
-        parts = [part for instance in scene.instances for part in instance.parts]
-        self._texels = SurfaceTexels(parts, scene.materials)
+    def __init__(self, scene: Scene) -> None:
+        self._texels = scene_texels(scene)
         vertices, materials = self._texels.vertices, self._texels.materials
-        self._rays = masked_caster(scene, caster or TriangleRayCaster(vertices, self._texels.faces))
+        self._rays = masked_caster(scene)
         self._double_sided = np.array([m.double_sided for m in materials])[self._texels.material]
         self._unlit = np.array([m.unlit for m in materials])[self._texels.material]
         self._sun = np.array(scene.sun, dtype=np.float64) / np.linalg.norm(scene.sun)
@@ -66,11 +63,11 @@ class OrthographicPictures:
         self._floor_m, self._ceiling_m = float(vertices[:, 2].min()), float(vertices[:, 2].max())
         self._sky = sky + (np.array([236.0, 238.0, 240.0]) - sky) * 0.6
 
-    def from_above(self, extent_m: tuple[float, float, float, float], pixel_m: float) -> NDArray[np.uint8]:
+    def from_above(self, extent_m: tuple[float, float, float, float], pixel_m: float) -> Bytes:
         """Take a map of everything: `take` by a plane above the scene; west, east, south and north, metres."""
         return self.take(Plane.above(self._ceiling_m + 1.0, extent_m), pixel_m)
 
-    def take(self, plane: Plane, pixel_m: float) -> NDArray[np.uint8]:
+    def take(self, plane: Plane, pixel_m: float) -> Bytes:
         """Take a picture with pixels of `pixel_m` metres; (H, W, 3) uint8 sRGB, row 0 at the top."""
         left, right, bottom, top = plane.extent_m
         width, height = max(1, round((right - left) / pixel_m)), max(1, round((top - bottom) / pixel_m))
@@ -123,7 +120,7 @@ class OrthographicPictures:
         return lit
 
 
-def _downscaled(material: Material, pixel_m: float) -> NDArray[np.uint8] | None:
+def _downscaled(material: Material, pixel_m: float) -> Bytes | None:
     """The texture with texels no smaller than a pixel, so that sampling one of them is enough."""
     if material.texture is None:
         return None
@@ -136,6 +133,4 @@ def _downscaled(material: Material, pixel_m: float) -> NDArray[np.uint8] | None:
 
 def orthographic_pictures(scene: Scene) -> OrthographicPictures:
     """Return the orthographic camera of the scene's context, over its one Embree scene."""
-    return context_of(scene).part(
-        "orthographic pictures", lambda: OrthographicPictures(scene, triangle_caster(scene))
-    )
+    return context_of(scene).part("orthographic pictures", lambda: OrthographicPictures(scene))

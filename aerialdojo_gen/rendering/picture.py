@@ -9,9 +9,9 @@ from types import TracebackType
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
-from aerialdojo_gen.geometry.cameras import Camera
+from aerialdojo_gen.geometry.arrays import Bytes, Floats, Int32s, Singles
+from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.scenes.light import Light
 
 # Planar depths between which surfaces are drawn, metres.
@@ -22,9 +22,9 @@ NEAR_M, FAR_M = 0.1, 2000.0
 class Picture:
     """Output of a renderer for one camera."""
 
-    rgb: NDArray[np.uint8]  # (H, W, 3) uint8; sRGB
-    depth_m: NDArray[np.float32]  # (H, W) float32; planar depth, metres; inf where nothing is hit
-    instance: NDArray[np.int32] | None = None  # (H, W) int32 or None
+    rgb: Bytes  # (H, W, 3) uint8; sRGB
+    depth_m: Singles  # (H, W) float32; planar depth, metres; inf where nothing is hit
+    instance: Int32s | None = None  # (H, W) int32 or None
 
 
 class Renderer(ABC):
@@ -35,14 +35,40 @@ class Renderer(ABC):
     light: Light  # That it draws by: at first the scene's own
 
     @abstractmethod
-    def render(self, camera: Camera, world_from_camera: NDArray[np.float64], instances: bool = False) -> Picture:
+    def render(self, camera: Camera, world_from_camera: Floats, instances: bool = False) -> Picture:
         """Take a picture from a pose (4, 4); its arrays are not changed by later calls."""
 
-    def render_views(
-        self, camera: Camera, poses: Sequence[NDArray[np.float64]], instances: bool = False
-    ) -> list[Picture]:
-        """Take several pictures."""
-        return [self.render(camera, pose, instances) for pose in poses]
+    def render_views(self, camera: Camera, poses: Sequence[Floats], instances: bool = False) -> list[Picture]:
+        """Take several pictures; cheaper than one by one where neighbours share their eye."""
+        shape = (len(poses), camera.height, camera.width)
+        rgb, depth_m = np.empty((*shape, 3), np.uint8), np.empty(shape, np.float32)
+        instance = np.empty(shape, np.int32) if instances else None
+        self.render_into(camera, poses, rgb, depth_m, instance)
+        return [Picture(rgb[k], depth_m[k], None if instance is None else instance[k]) for k in range(len(poses))]
+
+    def render_bodies(
+        self, camera: Camera, poses: Floats, views: Sequence[str], instance: Int32s | None = None
+    ) -> tuple[Bytes, Singles]:
+        """Take all views at poses (n, 4): RGB (n, views, H, W, 3) uint8 and planar depth, inf for no hit.
+
+        Instance ids go into `instance` (n, views, H, W), if it is given.
+        """
+        shape = (len(poses), len(views), camera.height, camera.width)
+        rgb, depth_m = np.empty((*shape, 3), np.uint8), np.empty(shape, np.float32)
+        world = [view_pose(pose[:3], float(pose[3]), view) for pose in poses for view in views]
+        flat = None if instance is None else instance.reshape(-1, *shape[2:])
+        self.render_into(camera, world, rgb.reshape(-1, *shape[2:], 3), depth_m.reshape(-1, *shape[2:]), flat)
+        return rgb, depth_m
+
+    def render_into(
+        self, camera: Camera, poses: Sequence[Floats], rgb: Bytes, depth_m: Singles, instance: Int32s | None
+    ) -> None:
+        """Take pictures into arrays (n, H, W, 3) and (n, H, W)."""
+        for k, pose in enumerate(poses):
+            picture = self.render(camera, pose, instance is not None)
+            rgb[k], depth_m[k] = picture.rgb, picture.depth_m
+            if instance is not None and picture.instance is not None:
+                instance[k] = picture.instance
 
     @abstractmethod
     def relight(self, light: Light) -> None:

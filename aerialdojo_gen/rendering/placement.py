@@ -36,19 +36,16 @@ def modalities(config: RenderConfig) -> tuple[str, ...]:
 
 def places(config: RenderConfig) -> list[Place]:
     """List the places of a recording, view by view."""
-    return [
-        _place(config, k, view, n, modality)
-        for k, view in enumerate(config.views)
-        for n, modality in enumerate(modalities(config))
-    ]
-
-
-def _place(config: RenderConfig, k: int, view: str, stream: int, modality: str) -> Place:
-    if config.layout == "tiled":
+    found = []
+    for k, view in enumerate(config.views):
         row, column = divmod(k, columns(config))
-        return Place(view, modality, TILED, stream, column * config.width, row * config.height)
-    name = f"{view}_{modality}"
-    return Place(view, modality, name if config.frames == "png" else f"{name}.{SUFFIX[modality]}")
+        for stream, modality in enumerate(modalities(config)):
+            suffix = "" if config.frames == "png" else f".{SUFFIX[modality]}"
+            if config.layout == "tiled":
+                found.append(Place(view, modality, TILED, stream, column * config.width, row * config.height))
+            else:
+                found.append(Place(view, modality, f"{view}_{modality}{suffix}"))
+    return found
 
 
 def columns(config: RenderConfig) -> int:

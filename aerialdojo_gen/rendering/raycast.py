@@ -9,23 +9,19 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aerialdojo_gen.base.kernels import njit
+from aerialdojo_gen.geometry.arrays import Bytes, Flags, Floats, Int32s, Ints, Singles
 from aerialdojo_gen.geometry.cameras import Camera
 from aerialdojo_gen.geometry.portable import product
-from aerialdojo_gen.geometry.rays import TriangleRayCaster
-from aerialdojo_gen.rendering.casters import triangle_caster
 from aerialdojo_gen.rendering.lighting import NO_CLOUDS, HeightMap, Lighting, ShadowMap, light_of
 from aerialdojo_gen.rendering.picture import Picture, Renderer
 from aerialdojo_gen.rendering.shading import shade
-from aerialdojo_gen.rendering.texels import Backdrop, SurfaceTexels, masked_caster
+from aerialdojo_gen.rendering.texels import Backdrop, masked_caster, scene_texels
 from aerialdojo_gen.scenes.context import context_of
 from aerialdojo_gen.scenes.light import Light
 from aerialdojo_gen.scenes.model import Scene
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int32]
 _WIDE_M = 4.0
 
 
@@ -34,16 +30,16 @@ class RayRenderer(Renderer):
 
     name, device = "rays", "Embree"
 
-    def __init__(self, scene: Scene, caster: TriangleRayCaster | None = None) -> None:
-        texels = SurfaceTexels([part for instance in scene.instances for part in instance.parts], scene.materials)
+    def __init__(self, scene: Scene) -> None:
+        texels = scene_texels(scene)
         counts = [len(instance.faces) for instance in scene.instances]
         self._owner = np.repeat(np.arange(len(counts), dtype=np.int32), counts)
         self._material = texels.material.astype(np.int32)
         self._corners, self._uv = texels.vertices[texels.faces], texels.uv[texels.faces]
         # Instances that wide both ways are ground, roads, floors or roofs.
         bounds = np.array([instance.bounds for instance in scene.instances]).reshape(-1, 2, 3)
-        self.wide: NDArray[np.bool_] = (bounds[:, 1, :2] - bounds[:, 0, :2]).min(axis=1) > _WIDE_M
-        self._rays = masked_caster(scene, caster or TriangleRayCaster(texels.vertices, texels.faces))
+        self.wide: Flags = (bounds[:, 1, :2] - bounds[:, 0, :2]).min(axis=1) > _WIDE_M
+        self._rays = masked_caster(scene)
         self._vertex_colours = texels if texels.has_vertex_colours else None
         self._backdrop = Backdrop(scene)
         self._scene, self._materials = scene, [material.name for material in texels.materials]
@@ -95,9 +91,9 @@ def pixel_rays(camera: Camera) -> tuple[Floats, Floats]:
 
 @njit(cache=True, error_model="numpy")
 def _hit_attributes(
-    eye: Floats, directions: Floats, distance: Floats, length: Floats, face: Ints, corners: Floats, uv: Floats,
-    material: Ints, owner: Ints, tiles: NDArray[np.int64], texels: NDArray[np.uint8],
-) -> tuple[NDArray[np.uint8], NDArray[np.float32], Ints, Ints]:  # fmt: skip
+    eye: Floats, directions: Floats, distance: Floats, length: Floats, face: Int32s, corners: Floats, uv: Floats,
+    material: Int32s, owner: Int32s, tiles: Ints, texels: Bytes,
+) -> tuple[Bytes, Singles, Int32s, Int32s]:  # fmt: skip
     """Colour of the nearest texel, planar depth, material and instance of n ray hits."""
     rays = len(face)
     albedo, depth = np.zeros((rays, 3), np.uint8), np.full(rays, np.inf, np.float32)
@@ -133,4 +129,4 @@ def _hit_attributes(
 
 def ray_renderer(scene: Scene) -> RayRenderer:
     """Return the scene's ray renderer."""
-    return context_of(scene).part("ray renderer", lambda: RayRenderer(scene, triangle_caster(scene)))
+    return context_of(scene).part("ray renderer", lambda: RayRenderer(scene))

@@ -7,6 +7,7 @@ import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,23 +16,62 @@ from numpy.typing import ArrayLike, NDArray
 
 from aerialdojo_gen.base.config.sections import RenderConfig
 from aerialdojo_gen.base.errors import RenderError
+from aerialdojo_gen.geometry.arrays import Bytes, Floats, Int32s
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
+from aerialdojo_gen.geometry.frames import wrap_angle_rad
 from aerialdojo_gen.rendering.checks import Solid, ViewChecks
 from aerialdojo_gen.rendering.codecs import PngWriter, VideoWriter, to_stored
 from aerialdojo_gen.rendering.picture import Picture, Renderer
 from aerialdojo_gen.rendering.placement import TILED, Place, columns, modalities, places, tiled
-from aerialdojo_gen.rendering.trajectory import FramePoses, by_steps, by_time
-from aerialdojo_gen.rendering.video import Video
+from aerialdojo_gen.rendering.reader import Video
 
-Floats = NDArray[np.float64]
+
+@dataclass(frozen=True, eq=False)
+class FramePoses:
+    """Where the body is in every frame."""
+
+    time_s: Floats  # (n,) float64; since the first frame
+    step: Int32s  # (n,) int32; the frame's trajectory pose: the last one reached
+    action: NDArray[np.int8]  # (n,) int8; the action at that pose
+    position: Floats  # (n, 3) float64; the body's centre, metres, world frame
+    yaw_rad: Floats  # (n,) float64; in (-π, π] if interpolated, else as stored
 
 
 def frame_poses(route: dict[str, Any], config: RenderConfig) -> FramePoses:
-    """Poses of a recording's frames."""
+    """Poses of a recording's frames: one a trajectory pose, or at a constant rate."""
     position = np.stack([route["x_m"], route["y_m"], route["z_m"]], axis=1)
     if config.sampling == "steps":
-        return by_steps(position, route["yaw_rad"], route["action"], config.fps)
+        step, yaw = np.arange(len(position), dtype=np.int32), np.asarray(route["yaw_rad"], dtype=np.float64)
+        return FramePoses(step / config.fps, step, np.asarray(route["action"], dtype=np.int8), position, yaw)
     return by_time(position, route["yaw_rad"], route["action"], config.fps, config.cruise_m_s, config.yaw_rate_deg_s)
+
+
+def by_time(
+    position: ArrayLike, yaw_rad: ArrayLike, action: ArrayLike, fps: float, cruise_m_s: float, yaw_rate_deg_s: float
+) -> FramePoses:
+    """Frames at a constant rate along the path; a segment takes the longer of flying and turning the short way."""
+    p, yaw = np.asarray(position, dtype=np.float64), np.asarray(yaw_rad, dtype=np.float64)
+    turn = wrap_angle_rad(np.diff(yaw))
+    seconds = np.maximum(
+        np.linalg.norm(np.diff(p, axis=0), axis=1) / cruise_m_s, np.abs(np.degrees(turn)) / yaw_rate_deg_s
+    )
+    arrival = np.concatenate([[0.0], np.cumsum(seconds)])
+    # Ignore rounding above a whole number of frames.
+    n = int(np.ceil(arrival[-1] * fps - 1e-9)) + 1
+    time = np.arange(n) / fps
+    flown = np.minimum(time, arrival[-1])
+    step = np.searchsorted(arrival, flown + 1e-12, side="right") - 1
+    step[-1] = len(p) - 1
+    k = np.minimum(step, len(p) - 2) if len(p) > 1 else np.zeros(n, dtype=np.int64)
+    if len(p) == 1:
+        at, heading = np.repeat(p, n, axis=0), np.repeat(yaw, n)
+    else:
+        share = np.divide(flown - arrival[k], seconds[k], out=np.ones(n), where=seconds[k] > 0)
+        share = np.clip(share, 0.0, 1.0)
+        at = p[k] + share[:, None] * (p[k + 1] - p[k])
+        heading = np.asarray(wrap_angle_rad(yaw[k] + share * turn[k]))
+        at[-1], heading[-1] = p[-1], yaw[-1]
+    return FramePoses(time, step.astype(np.int32), np.asarray(action, dtype=np.int8)[step], at, heading)
 
 
 def record_views(
@@ -78,9 +118,14 @@ def _writers(
         writers.append((TILED, stack.enter_context(one)))
     else:
         for place in own:
-            writer = _writer(folder, place, comments, config)
-            stack.enter_context(writer)
-            writers.append((place.view, writer))
+            path, comment = folder / place.file, comments[place.view]
+            if config.frames == "png":
+                writers.append((place.view, PngWriter(path, place.modality, comment)))
+                continue
+            one = VideoWriter(
+                path, [place.modality], config.width, config.height, config.fps, config.crf, config.preset, comment
+            )
+            writers.append((place.view, stack.enter_context(one)))
 
     def write(pictures: dict[str, Picture]) -> None:
         stored = {view: _encodable(picture, config) for view, picture in pictures.items()}
@@ -93,17 +138,8 @@ def _writers(
     return write
 
 
-def _writer(folder: Path, place: Place, comments: dict[str, str], config: RenderConfig) -> VideoWriter | PngWriter:
-    path, comment = folder / place.file, comments[place.view]
-    if config.frames == "png":
-        return PngWriter(path, place.modality, comment)
-    return VideoWriter(
-        path, [place.modality], config.width, config.height, config.fps, config.crf, config.preset, comment
-    )
-
-
-def _encodable(picture: Picture, config: RenderConfig) -> dict[str, NDArray[np.uint8] | NDArray[np.uint16]]:
-    frames: dict[str, NDArray[np.uint8] | NDArray[np.uint16]] = {
+def _encodable(picture: Picture, config: RenderConfig) -> dict[str, Bytes | NDArray[np.uint16]]:
+    frames: dict[str, Bytes | NDArray[np.uint16]] = {
         "rgb": picture.rgb,
         "depth": to_stored(picture.depth_m, config.depth_step),
     }

@@ -14,10 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.base.kernels import njit
+from aerialdojo_gen.geometry.arrays import Bytes, Flags, Floats, Int32s, Singles
 from aerialdojo_gen.geometry.cameras import Camera
 from aerialdojo_gen.rendering.lighting import REACH_M, HeightMap, Lighting, ShadowMap
-
-Floats = NDArray[np.float64]
 
 # How much brighter the sky is on the sun's side, and how much of its light a place under others loses at most.
 SIDE, _SHADED = 0.16, 0.62
@@ -40,9 +39,9 @@ _CLOUD_FLAT, _CLOUD_SCALE = 0.12, 0.11
 
 
 def shade(
-    camera: Camera, world_from_camera: Floats, albedo: NDArray[np.uint8], depth_m: NDArray[np.float32],
-    surface: NDArray[np.int32], light: Lighting, shadow: ShadowMap, clouds: NDArray[np.uint8], heights: HeightMap,
-) -> NDArray[np.uint8]:  # fmt: skip
+    camera: Camera, world_from_camera: Floats, albedo: Bytes, depth_m: Singles,
+    surface: Int32s, light: Lighting, shadow: ShadowMap, clouds: Bytes, heights: HeightMap,
+) -> Bytes:  # fmt: skip
     """Light a picture: albedo (H, W, 3) uint8, planar depth and surface (H, W) give sRGB (H, W, 3) uint8."""
     out = np.empty_like(albedo)
     _shade(
@@ -81,7 +80,7 @@ def _smoothstep(t: Floats) -> Floats:
 
 
 @njit(cache=True)
-def _bilinear(table: NDArray[np.uint8], u: float, v: float) -> float:
+def _bilinear(table: Bytes, u: float, v: float) -> float:
     """A table's value between its cells' middles; beyond the border that of the nearest cell."""
     rows, columns = table.shape
     u, v = min(max(u - 0.5, 0.0), columns - 1.0), min(max(v - 0.5, 0.0), rows - 1.0)
@@ -92,7 +91,7 @@ def _bilinear(table: NDArray[np.uint8], u: float, v: float) -> float:
 
 
 @njit(cache=True)
-def _cloud(x: float, y: float, z: float, share: float, clouds: NDArray[np.uint8]) -> float:
+def _cloud(x: float, y: float, z: float, share: float, clouds: Bytes) -> float:
     """Thickness of the clouds, 0 to 1, in a direction (a unit vector) above the horizon."""
     n = clouds.shape[0]
     if n == 1:
@@ -109,7 +108,7 @@ def _cloud(x: float, y: float, z: float, share: float, clouds: NDArray[np.uint8]
 
 
 @njit(cache=True)
-def _sky(x: float, y: float, z: float, rows: Floats, clouds: NDArray[np.uint8], out: Floats) -> None:
+def _sky(x: float, y: float, z: float, rows: Floats, clouds: Bytes, out: Floats) -> None:
     """Colour of the sky, 0-255, in a direction (a unit vector); below the horizon that of haze."""
     z = max(z, 0.0)
     up = math.sqrt(z)
@@ -159,7 +158,7 @@ def _slope(w: Floats, row: int, col: int, down: int, right: int) -> float:
 
 
 @njit(cache=True)
-def _inverse_depths(depth: NDArray[np.float32], surface: NDArray[np.int32]) -> Floats:
+def _inverse_depths(depth: Singles, surface: Int32s) -> Floats:
     """Inverse depth of every pixel; 0 of the sky."""
     w = np.zeros(depth.shape)
     for row in range(depth.shape[0]):
@@ -180,7 +179,7 @@ def _turned(pose: Floats, x: float, y: float, z: float) -> tuple[float, float, f
 
 
 @njit(cache=True)
-def _fade(base: Floats, albedo: NDArray[np.uint8], across_texels: float, facing: float) -> None:
+def _fade(base: Floats, albedo: Bytes, across_texels: float, facing: float) -> None:
     """Take a texture's colour the less the more texels a pixel covers: the nearest one is noise there."""
     texels_2 = across_texels**2 / max(facing, 0.02)
     sharpness = min(1.0, max(0.0, (_FADE_TEXELS**2 - texels_2) / (_FADE_TEXELS**2 - 1.0)))
@@ -210,9 +209,9 @@ def _light(base: Floats, rows: Floats, up: float, open_sky: float, lit: float, d
 
 @njit(cache=True)
 def _shade(
-    albedo: NDArray[np.uint8], depth: NDArray[np.float32], surface: NDArray[np.int32], focal: float, pose: Floats,
-    colour: Floats, texel: Floats, unlit: NDArray[np.bool_], shiny: Floats, rows: Floats, shadow: ShadowMap,
-    clouds: NDArray[np.uint8], heights: HeightMap, out: NDArray[np.uint8],
+    albedo: Bytes, depth: Singles, surface: Int32s, focal: float, pose: Floats,
+    colour: Floats, texel: Floats, unlit: Flags, shiny: Floats, rows: Floats, shadow: ShadowMap,
+    clouds: Bytes, heights: HeightMap, out: Bytes,
 ) -> None:  # fmt: skip
     height, width = depth.shape
     sun = rows[0]

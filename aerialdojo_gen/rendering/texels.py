@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from aerialdojo_gen.geometry.arrays import Bytes, Flags, Floats, Int32s
 from aerialdojo_gen.geometry.cameras import Camera
 from aerialdojo_gen.geometry.rays import TriangleRayCaster
 from aerialdojo_gen.geometry.soup import soup
@@ -19,9 +20,6 @@ from aerialdojo_gen.scenes.colours import texel
 from aerialdojo_gen.scenes.context import context_of
 from aerialdojo_gen.scenes.model import HORIZON, Material, Part, Scene
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int32]
-Colours = NDArray[np.uint8]
 _Table = Callable[[Material], NDArray[Any] | None]
 
 # How many holes a ray passes through, and how far behind each it restarts, metres.
@@ -40,10 +38,13 @@ class SurfaceTexels:
         self.uv = np.concatenate([part.uv for part in parts]).astype(np.float64)
         self.has_vertex_colours = any(part.colours is not None for part in parts)
         if self.has_vertex_colours:
-            self._colours = np.concatenate([_vertex_colours(p, materials[p.material]) for p in parts])
+            means = (np.tile(np.array(materials[p.material].colour, np.uint8), (len(p.vertices), 1)) for p in parts)
+            self._colours = np.concatenate(
+                [mean if p.colours is None else p.colours for p, mean in zip(parts, means, strict=True)]
+            )
             self._is_coloured = np.repeat([part.colours is not None for part in parts], counts)
 
-    def barycentric(self, face: Ints, points: Floats) -> Floats:
+    def barycentric(self, face: Int32s, points: Floats) -> Floats:
         """Weights (n, 3) of a face's corners at points (n, 3) on it."""
         index = self.faces[face]
         a, b, c = (self.vertices[index[:, k]] for k in range(3))
@@ -54,23 +55,23 @@ class SurfaceTexels:
         v, w = (d11 * d20 - d01 * d21) / area, (d00 * d21 - d01 * d20) / area
         return np.stack([1.0 - v - w, v, w], axis=1)
 
-    def is_hole(self, face: Ints, points: Floats) -> NDArray[np.bool_]:
+    def is_hole(self, face: Int32s, points: Floats) -> Flags:
         """Whether points (n, 3) on faces (n,) are masked out."""
         out = np.zeros(len(face), dtype=bool)
         self._sample(out, face, points, lambda material: None if material.mask is None else ~material.mask)
         return out
 
-    def colours(self, face: Ints, points: Floats, texture: _Table = lambda material: material.texture) -> Colours:
-        """Colours (n, 3) of points (n, 3) on faces (n,), by the nearest texel of each material's texture."""
+    def colours(self, face: Int32s, points: Floats, texture: _Table = lambda material: material.texture) -> Bytes:
+        """Bytes (n, 3) of points (n, 3) on faces (n,), by the nearest texel of each material's texture."""
         out = self.mean_colours(face)
         self._sample(out, face, points, texture)
         return self.with_vertex_colours(face, points, out)
 
-    def mean_colours(self, face: Ints) -> Colours:
+    def mean_colours(self, face: Int32s) -> Bytes:
         """Mean colours (n, 3) of the materials of faces (n,)."""
         return np.array([m.colour for m in self.materials], dtype=np.uint8)[self.material[face]]
 
-    def _sample(self, out: NDArray[Any], face: Ints, points: Floats, table: _Table) -> None:
+    def _sample(self, out: NDArray[Any], face: Int32s, points: Floats, table: _Table) -> None:
         """Write the texels of materials' tables at points on faces, where they have one."""
         material = self.material[face]
         for k in np.unique(material):
@@ -79,13 +80,13 @@ class SurfaceTexels:
                 rows = np.flatnonzero(material == k)
                 out[rows] = texels[texel(self.uv_at(face[rows], points[rows]), *texels.shape[:2])]
 
-    def normals(self, face: Ints) -> Floats:
+    def normals(self, face: Int32s) -> Floats:
         """Unit normals (n, 3) of faces (n,)."""
         a, b, c = (self.vertices[self.faces[face, k]] for k in range(3))
         normal = np.cross(b - a, c - a)
         return np.asarray(normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30))
 
-    def with_vertex_colours(self, face: Ints, points: Floats, colours: NDArray[Any]) -> NDArray[Any]:
+    def with_vertex_colours(self, face: Int32s, points: Floats, colours: NDArray[Any]) -> NDArray[Any]:
         """Replace colours (n, 3) by interpolated vertex colours where a part has them."""
         if not self.has_vertex_colours:
             return colours
@@ -96,16 +97,10 @@ class SurfaceTexels:
         out[rows] = np.clip(np.rint(mixed), 0, 255)
         return out
 
-    def uv_at(self, face: Ints, points: Floats) -> Floats:
+    def uv_at(self, face: Int32s, points: Floats) -> Floats:
         """Texture coordinates (n, 2) of points (n, 3) on faces (n,)."""
         share, uv = self.barycentric(face, points), self.uv[self.faces[face]]
         return np.asarray(share[:, :1] * uv[:, 0] + share[:, 1:2] * uv[:, 1] + share[:, 2:] * uv[:, 2])
-
-
-def _vertex_colours(part: Part, material: Material) -> NDArray[np.uint8]:
-    if part.colours is not None:
-        return part.colours
-    return np.tile(np.array(material.colour, dtype=np.uint8), (len(part.vertices), 1))
 
 
 class MaskedRayCaster:
@@ -117,7 +112,7 @@ class MaskedRayCaster:
         holed = np.array([m.mask is not None for m in texels.materials])
         self._holed = holed[texels.material]
 
-    def first_hit(self, origins: Floats, directions: Floats) -> tuple[Floats, Ints]:
+    def first_hit(self, origins: Floats, directions: Floats) -> tuple[Floats, Int32s]:
         """Find the first opaque hits; see `aerialdojo_gen.geometry.rays.TriangleRayCaster.first_hit`."""
         distance, face = self._caster.first_hit(origins, directions)
         length = np.linalg.norm(directions, axis=1)
@@ -143,9 +138,9 @@ def scene_texels(scene: Scene) -> SurfaceTexels:
     return context_of(scene).part("texels", lambda: SurfaceTexels(parts, scene.materials))
 
 
-def masked_caster(scene: Scene, caster: TriangleRayCaster | None = None) -> TriangleRayCaster | MaskedRayCaster:
-    """Return a ray caster that respects alpha masks; the plain one if the scene has none."""
-    whole = caster or triangle_caster(scene)
+def masked_caster(scene: Scene) -> TriangleRayCaster | MaskedRayCaster:
+    """Return the scene's ray caster that respects alpha masks; the plain one if the scene has none."""
+    whole = triangle_caster(scene)
     if all(material.mask is None for material in scene.materials.values()):
         return whole
     return MaskedRayCaster(whole, scene_texels(scene))
@@ -162,9 +157,7 @@ class Backdrop:
         self._lit = np.repeat([i.surface == HORIZON for i in shown for _ in i.parts], [len(p.faces) for p in parts])
         self.light = light
 
-    def paint(
-        self, rgb: NDArray[np.uint8], missing: NDArray[np.bool_], camera: Camera, world_from_camera: Floats
-    ) -> None:
+    def paint(self, rgb: Bytes, missing: Flags, camera: Camera, world_from_camera: Floats) -> None:
         """Paint the backdrop into the `missing` pixels of a picture, in place."""
         if self._caster is None or self._texels is None or not missing.any():
             return
@@ -185,7 +178,7 @@ class Backdrop:
         rgb[rows, columns] = np.clip(colours + 0.5, 0.0, 255.0).astype(np.uint8)
 
 
-def downscale(texture: NDArray[np.uint8], longest: int) -> NDArray[np.uint8]:
+def downscale(texture: Bytes, longest: int) -> Bytes:
     """Shrink a texture to at most `longest` pixels on its longer side."""
     height, width = texture.shape[:2]
     if max(height, width) <= longest:

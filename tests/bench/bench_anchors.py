@@ -13,27 +13,20 @@ seen from within 60° of it; *directions* the smallest azimuth between two of th
 
 from __future__ import annotations
 
-import argparse
 import math
-import time
 from pathlib import Path
 
 import numpy as np
+from common import PIPELINE, cpu_s, job_of, options_of
 
-from aerialdojo_gen.base.config.pipeline import load_pipeline
 from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.geometry.part_visibility import FRONT_RAD
 from aerialdojo_gen.pipeline.scoring.geometric import judge
-from aerialdojo_gen.pipeline.stage import Job, ProjectPaths
 from aerialdojo_gen.pipeline.stages.work.anchor_pictures import CandidateViews
 from aerialdojo_gen.pipeline.stages.work.anchor_sample import candidates_of
 from aerialdojo_gen.pipeline.stages.work.anchor_world import World
-from aerialdojo_gen.store import shards as store
 
-ROOT = Path(__file__).resolve().parents[2]
 WHO = ("selected", "random", "nearest")
-
-
 MEASURES = ("seen", "framed", "open", "told", "parts", "front")
 
 
@@ -41,16 +34,15 @@ def measures(found, chosen, radius_m, config):
     looked = CandidateViews.of(found, np.array(chosen), config)
     for view in looked.pictures(np.arange(len(chosen)), config.picture_px, config.fov_deg):
         terms = judge(view, radius_m, config.standoff_m)
-        front = None if view.off_front_rad is None else view.off_front_rad <= FRONT_RAD
+        off_front_rad = view.known.off_front_rad
+        front = None if off_front_rad is None else off_front_rad <= FRONT_RAD
         yield [terms.unoccluded, terms.framed, terms.open, terms.shown, terms.tells, front]
 
 
-def scene_figures(name, data, pipeline):
+def scene_figures(name, data):
     """(objects, 3 anchors, measures), and the smallest angle between an object's anchors, degrees."""
-    config = pipeline.anchor_sample
-    roots = ProjectPaths(data, ROOT / "scene_assets", ROOT / "scene_assets/scenes", ROOT / "annotations")
-    job = Job("anchor-sample", name, 0, 1, pipeline.seed, pipeline.embodiment, roots)
-    world = World.of(job.scene_model(), pipeline.embodiment.radius_m, config.margin_m)
+    config, radius_m, job = PIPELINE.anchor_sample, PIPELINE.embodiment.radius_m, job_of("anchor-sample", name, data)
+    world = World.of(job.scene_model(), radius_m, config.margin_m)
     anchors = job.read("anchors").to_pylist()
     figures, angles = [], []
     for item in job.read("objects").to_pylist():
@@ -65,7 +57,7 @@ def scene_figures(name, data, pipeline):
             generator(0, "bench-anchors", name, item["object_id"]).choice(valid),
             valid[np.argmin(away[valid])],
         )
-        figures.append([*measures(found, chosen, pipeline.embodiment.radius_m, config)])
+        figures.append([*measures(found, chosen, radius_m, config)])
         turn = sorted(math.atan2(a["y_m"] - centroid[1], a["x_m"] - centroid[0]) for a in own)
         if len(turn) > 1:
             gaps = np.diff([*turn, turn[0] + 2 * math.pi])
@@ -74,31 +66,23 @@ def scene_figures(name, data, pipeline):
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--data", type=Path, default=ROOT / "data")
-    parser.add_argument("--scene", nargs="*", default=[])
-    options = parser.parse_args()
-    pipeline = load_pipeline(ROOT / "pipelines/aerialdojo-200k.toml")
+    options = options_of(__doc__, data=Path("data"), scene=[])
     scenes = options.scene or sorted(p.name for p in (options.data / "anchors").glob("*_*"))
     if not scenes:
         print(f"no anchors in {options.data}: make dataset first")
         return 0
-    begun, figures, angles = time.process_time(), [], []
-    for name in scenes:
-        assert store.check_scene_name(name)
-        part, turns = scene_figures(name, options.data, pipeline)
-        figures.append(part)
-        angles += turns
-    table = np.concatenate(figures)
-    print(f"{len(table):,} objects of {len(scenes)} scenes, {time.process_time() - begun:.0f} s of CPU time")
+    seconds, found = cpu_s(lambda: [scene_figures(name, options.data) for name in scenes])
+    figures, angles = zip(*found, strict=True)
+    table, turns = np.concatenate(figures), np.concatenate(angles)
+    print(f"{len(table):,} objects of {len(scenes)} scenes, {seconds:.0f} s of CPU time")
     print(f"{'anchor':10}" + "".join(f"{measure:>9}" for measure in MEASURES))
     for k, who in enumerate(WHO):
         print(f"{who:10}" + "".join(f"{mean:9.1%}" for mean in np.nanmean(table[:, k], axis=0)))
     told = table[..., MEASURES.index("told")]
     wins = (told[:, 0] > told[:, 1]).mean(), (told[:, 0] < told[:, 1]).mean()
     print(f"the selected one tells more than the random one of {wins[0]:.0%} of the objects, less of {wins[1]:.0%}")
-    print(f"directions: 45° or more apart for {np.mean(np.array(angles) > 44.9):.1%} of the objects, "
-          f"smallest {min(angles):.0f}°")  # fmt: skip
+    print(f"directions: 45° or more apart for {np.mean(turns > 44.9):.1%} of the objects, "
+          f"smallest {turns.min():.0f}°")  # fmt: skip
     return 0
 
 

@@ -1,45 +1,20 @@
-"""How planning time grows: with the number of candidates, with the volume of the scene, and over whole scenes.
+"""How planning time grows: with the number of candidates, and with the volume of the scene.
 
-    python tests/bench/bench_growth.py [--data data] [--scenes U_Mall_0 N_Forest_0 ...]
+    python tests/bench/bench_growth.py
 
-Times are CPU seconds of this process, medians of three. Over whole scenes `plan` is run once each, its clearance grid
-included (these need the tables up to `pairs`), and seconds are compared with a model that has two factors: one for a
-goal and a million cells, for the cost-to-go, and one for an expansion of the search.
+Times are CPU seconds of this process, medians of three.
 """
 
 from __future__ import annotations
 
-import argparse
-import sys
-import time
-from pathlib import Path
-
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).resolve().parent))
 from bench_planner import RADIUS, free_pose, world
+from common import median_s
 
-from aerialdojo_gen.base.config.pipeline import load_pipeline
 from aerialdojo_gen.base.config.sections import PlanConfig
-from aerialdojo_gen.pipeline.stage import Job, ProjectPaths
-from aerialdojo_gen.pipeline.stages.work import plan
-from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.planner import Planner
 
-ROOT = Path(__file__).resolve().parents[2]
-SCENES = ["U_Mall_0", "I_Harbor_0", "N_Forest_0", "N_Mountain_0", "U_Park_1", "D_Flood_0"]
-REPEATS = 3
 DENSITY = 250 / 120**2  # things a square metre
-
-
-def seconds(work) -> float:
-    """Median CPU time of some work."""
-    took = []
-    for _ in range(REPEATS):
-        t = time.process_time()
-        work()
-        took.append(time.process_time() - t)
-    return float(np.median(took))
 
 
 def planner_of(edge: float) -> Planner:
@@ -49,35 +24,7 @@ def planner_of(edge: float) -> Planner:
     return planner
 
 
-def whole_scenes(data: Path, scenes: list[str]) -> None:
-    """Plan scenes, and fit the model."""
-    pipeline = load_pipeline(ROOT / "pipelines/aerialdojo-200k.toml")
-    rows = []
-    for name in scenes:
-        job = Job("plan", name, 0, 1, pipeline.seed, pipeline.embodiment, ProjectPaths(data, data, data, data))
-        scene = job.scene_model()
-        t = time.process_time()
-        plans = plan.run(job, pipeline.plan).tables["plans"]
-        took = time.process_time() - t
-        cells = ClearanceGrid.of(scene, pipeline.plan.cell_m, RADIUS).arrays.field.size
-        goals = len(np.unique(job.read("pairs")["target_object_id"].to_numpy()))
-        expansions = np.nan_to_num(plans["expansions"].to_numpy().astype(float)).sum()
-        rows.append((took, goals * cells / 1e6, expansions / 1e6))
-    took, *causes = np.array(rows).T
-    # Relative errors count, so that small scenes do.
-    factors = np.linalg.lstsq(np.column_stack(causes) / took[:, None], np.ones(len(took)), rcond=None)[0]
-    print(f"whole scenes: {1e3 * factors[0]:.1f} ms a goal and million cells, {factors[1]:.1f} µs an expansion")
-    print(f"{'scene':>22}{'seconds':>10}{'goals x Mcells':>16}{'M expansions':>14}{'model / s':>11}")
-    for name, row in zip(scenes, rows, strict=True):
-        model = factors[0] * row[1] + factors[1] * row[2]
-        print(f"{name:>22}{row[0]:>10.2f}{row[1]:>16.1f}{row[2]:>14.2f}{model / row[0]:>11.2f}")
-
-
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--data", type=Path, default=Path("data"))
-    parser.add_argument("--scenes", nargs="+", default=SCENES)
-    options = parser.parse_args()
     print("candidates: 120 x 120 x 25 m, one target, starts within 70 m")
     print(f"{'starts':>10}{'seconds':>10}{'ms a candidate':>18}{'ms more a candidate':>22}")
     planner, rng = planner_of(120.0), np.random.default_rng(1)
@@ -85,28 +32,24 @@ def main() -> None:
     starts = np.array([free_pose(planner, rng, goal, 70.0) for _ in range(640)])
     before = None
     for n in (40, 160, 640):
-        took = seconds(lambda n=n: planner.plan_target(goal, starts[:n]))
+        took = median_s(lambda n=n: planner.plan_target(goal, starts[:n]))
         more = "" if before is None else f"{1e3 * (took - before[1]) / (n - before[0]):.2f}"
         print(f"{n:>10}{took:>10.3f}{1e3 * took / n:>18.2f}{more:>22}")
         before = (n, took)
     print("volume: 25 m high, as many things a square metre, 40 starts within 70 m")
     print(f"{'edge':>10}{'1000 m3':>10}{'build s':>10}{'cost-to-go s':>14}{'s / Mm3':>10}{'ms a search':>13}")
     for edge in (60.0, 120.0, 240.0):
-        built = seconds(lambda edge=edge: planner_of(edge))
+        built = median_s(lambda edge=edge: planner_of(edge))
         planner, rng = planner_of(edge), np.random.default_rng(2)
         goal = np.array([edge / 2, edge / 2, 22.0, 0.0])
         starts = np.array([free_pose(planner, rng, goal, 70.0) for _ in range(40)])
-        field = seconds(lambda planner=planner, goal=goal: planner._expand(goal))
-        whole = seconds(lambda planner=planner, goal=goal, starts=starts: planner.plan_target(goal, starts))
+        field = median_s(lambda planner=planner, goal=goal: planner._expand(goal))
+        whole = median_s(lambda planner=planner, goal=goal, starts=starts: planner.plan_target(goal, starts))
         volume = edge**2 * 25
         print(
             f"{edge:>10.0f}{volume / 1e3:>10.0f}{built:>10.2f}{field:>14.3f}{1e6 * (built + field) / volume:>10.2f}"
             f"{1e3 * (whole - field) / len(starts):>13.2f}"
         )
-    if all((options.data / "pairs" / name).is_dir() for name in options.scenes):
-        whole_scenes(options.data, options.scenes)
-    else:
-        print(f"whole scenes: {options.data} has no pairs of them")
 
 
 if __name__ == "__main__":

@@ -7,21 +7,18 @@ By rays, with the backdrop and without it. A pose is 1.5 to 20 m over what stand
 
 from __future__ import annotations
 
-import argparse
 from pathlib import Path
 
 import numpy as np
+from common import ASSETS, built, options_of
 
 from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.geometry.rays import TriangleRayCaster
 from aerialdojo_gen.geometry.soup import soup
-from aerialdojo_gen.scenes.build import build_scene
-from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.glb import read_glb
 from aerialdojo_gen.scenes.model import Scene
 
-ASSETS = Path(__file__).resolve().parents[2] / "scene_assets"
 CAMERA = Camera(80, 80, 90.0)
 
 
@@ -46,17 +43,11 @@ def shares(scene: Scene, views: int) -> np.ndarray:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--views", type=int, default=16)
-    parser.add_argument("--meshes", type=Path)
-    parser.add_argument("--scene", action="append")
-    args = parser.parse_args()
-    names = args.scene or sorted(path.stem for path in (ASSETS / "scenes").glob("*.toml"))
-    catalogue, every = load_catalogue(ASSETS), []
-    for name in names:
-        mesh = args.meshes and args.meshes / f"{name}.glb"
-        scene = read_glb(mesh) if mesh else build_scene(ASSETS / "scenes" / f"{name}.toml", catalogue)
-        found = shares(scene, args.views)
+    options = options_of(__doc__, views=16, meshes=None, scene=[])
+    every = []
+    for name in options.scene or sorted(path.stem for path in (ASSETS / "scenes").glob("*.toml")):
+        scene = read_glb(Path(options.meshes) / f"{name}.glb") if options.meshes else built(name)
+        found = shares(scene, options.views)
         every.append(found)
         triangles = sum(len(part.faces) for i in scene.backdrop for part in i.parts)
         mean, most = 100 * found.mean(axis=0), 100 * found.max(axis=0)

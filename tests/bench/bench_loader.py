@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable
 from tempfile import TemporaryDirectory
 
 import numpy as np
+from common import best_ms
 
 from aerialdojo_gen import GlRenderer, make_env
 from aerialdojo_gen.benchmark.observations import renderer_for
@@ -20,23 +20,13 @@ from aerialdojo_gen.benchmark.tasks import mesh_of
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.learning import Trajectories
 from aerialdojo_gen.rendering.gl import clip_from_world
-from aerialdojo_gen.rendering.gl_target import read_pixels
+from aerialdojo_gen.rendering.gl_programs import read_pixels
 from aerialdojo_gen.rendering.picture import FAR_M, NEAR_M
 from aerialdojo_gen.scenes.context import SEVERAL, open_scene
 from aerialdojo_gen.store.root import open_root
 from aerialdojo_gen.store.schemas import VIEWS
 
 SAMPLES = 48
-
-
-def best_ms(work: Callable[[], object], times: int = 3) -> float:
-    """CPU milliseconds of the best of some runs."""
-    found = []
-    for _ in range(times):
-        begun = time.process_time()
-        work()
-        found.append(time.process_time() - begun)
-    return 1e3 * min(found)
 
 
 def scene_rows(data: str, scene: str) -> None:
@@ -61,12 +51,9 @@ def scene_rows(data: str, scene: str) -> None:
                     for view in views:
                         renderer.render(camera, view_pose(pose[:3], pose[3], view))
 
-            def cull(poses=poses, views=views, camera=camera, size=size):
+            def cull(poses=poses, views=views, camera=camera):
                 for pose in poses:
-                    clips = [clip_from_world(camera, view_pose(pose[:3], pose[3], v), NEAR_M, FAR_M) for v in views]
-                    nearness = np.zeros((len(views), size, size), np.float32)
-                    for culling in renderer.bodies()._cullings:
-                        culling.visible_indices(np.stack(clips), pose[:3].copy(), size, size, nearness)
+                    visible_in(renderer, camera, [view_pose(pose[:3], pose[3], view) for view in views])
 
             def load(loaded=loaded, numbers=numbers):
                 loaded.batch(numbers)
@@ -85,6 +72,13 @@ def scene_rows(data: str, scene: str) -> None:
             )
 
 
+def visible_in(renderer: GlRenderer, camera: Camera, poses: list[np.ndarray]) -> tuple[np.ndarray, list]:
+    """The clip matrices of a body's views, and what they show by kind."""
+    clips = np.stack([clip_from_world(camera, pose, NEAR_M, FAR_M) for pose in poses])
+    nearness, eye = np.zeros((len(poses), camera.height, camera.width), np.float32), poses[0][:3, 3].copy()
+    return clips, [d.kind.chunks.visible_indices(clips, eye, nearness, d.kind.hides) for d in renderer._sets]
+
+
 def drawing_ms(
     renderer: GlRenderer, camera: Camera, poses: list[np.ndarray], views: tuple[str, ...]
 ) -> tuple[float, float]:
@@ -96,11 +90,7 @@ def drawing_ms(
         handed = read = 0.0
         for pose in poses:
             world = [view_pose(pose[:3], pose[3], view) for view in views]
-            clips = np.stack([clip_from_world(camera, matrix, NEAR_M, FAR_M) for matrix in world])
-            nearness = np.zeros((len(views), size, size), np.float32)
-            visible = [
-                c.visible_indices(clips, pose[:3].copy(), size, size, nearness) for c in renderer.bodies()._cullings
-            ]
+            clips, visible = visible_in(renderer, camera, world)
             for v, matrix in enumerate(world):
                 begun = time.process_time()
                 target = renderer.draw_triangles(camera, matrix, clips[v], [of_kind[v] for of_kind in visible])

@@ -1,6 +1,10 @@
 """The planner beside OMPL's, in one run: the same FCL world, the same pairs, one core.
 
     python tests/bench/bench_ompl.py [--targets 2] [--starts 170] [--singles 40] [--rounds 3] [--some 40] [--slow 8]
+        [--seconds 3]
+
+`--starts` is of each target (the dataset has 174) and `--singles` the number of goals with a single start; (b) gets
+`--some` pairs in a regime and (c) `--slow`, each with a limit of `--seconds`.
 
 The worlds are a made-up one of boxes and trees with random pairs, and scenes of the dataset with their own
 candidates (`--data data`; these need the tables up to `pairs`). Two regimes: single queries, with one start a goal,
@@ -21,34 +25,27 @@ limit, swept, and its time is the wall's. OMPL plans positions only, in a space 
 
 from __future__ import annotations
 
-import argparse
-import sys
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
+from bench_planner import RADIUS, free_pose, world
+from common import PIPELINE, T, cpu_s, job_of, options_of
 from ompl import base, geometric, util
 
-sys.path.insert(0, str(Path(__file__).resolve().parent))
-from bench_planner import RADIUS, free_pose, world
-
-from aerialdojo_gen.base.config.pipeline import load_pipeline
 from aerialdojo_gen.base.config.sections import PlanConfig
-from aerialdojo_gen.pipeline.stage import Job, ProjectPaths
 from aerialdojo_gen.pipeline.stages.work import plan
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.collision import CollisionWorld
 from aerialdojo_gen.planning.planner import Planner, Route
 from aerialdojo_gen.scenes.model import Scene
 
-ROOT = Path(__file__).resolve().parents[2]
 SCENES = ("U_Mall_0", "N_Forest_0", "U_ConstructionSite_0")
 SAMPLED_M = 0.1
-T = TypeVar("T")
 
 
 @dataclass
@@ -76,8 +73,7 @@ def made_up(targets: int, starts: int, singles: int, rounds: int) -> Case:
 
 
 def of_dataset(scene_name: str, data: Path, targets: int, starts: int, singles: int, rounds: int) -> Case:
-    pipeline = load_pipeline(ROOT / "pipelines/aerialdojo-200k.toml")
-    job = Job("plan", scene_name, 0, 1, pipeline.seed, pipeline.embodiment, ProjectPaths(data, data, data, data))
+    job = job_of("plan", scene_name, data)
     scene, pairs = job.scene_model(), job.read("pairs").sort_by("pair_id")
     goals, begins = plan._ends(job, pairs)
     which, rng = pairs["target_object_id"].to_numpy(), np.random.default_rng(1)
@@ -88,7 +84,7 @@ def of_dataset(scene_name: str, data: Path, targets: int, starts: int, singles: 
     for _ in range(rounds):
         rows = [rng.choice(np.flatnonzero(which == target)) for target in rng.permutation(every)[:singles]]
         by_round.append([(goals[row], begins[row]) for row in rows])
-    return Case(scene_name, scene, Planner(scene, pipeline.plan, RADIUS), groups, by_round)
+    return Case(scene_name, scene, Planner(scene, PIPELINE.plan, RADIUS), groups, by_round)
 
 
 class Swept(base.MotionValidator):
@@ -174,12 +170,8 @@ def lengths_of(routes: list[Route]) -> np.ndarray:
 
 def timed(call: Callable[..., T], queries: Iterable[tuple[Any, ...]]) -> tuple[np.ndarray, list[T]]:
     """CPU seconds of each query, and the results."""
-    took, found = [], []
-    for query in queries:
-        t = time.process_time()
-        found.append(call(*query))
-        took.append(time.process_time() - t)
-    return np.array(took), found
+    took, found = zip(*(cpu_s(call, *query) for query in queries), strict=True)
+    return np.array(took), list(found)
 
 
 def others(
@@ -196,11 +188,8 @@ def others(
 def scene_line(case: Case) -> None:
     config, shape = case.planner.config, " x ".join(map(str, case.planner.grid.moves.shape))
     how = {"cell_m": config.cell_m, "radius_m": RADIUS, "margin_m": config.margin_m, "cap_m": config.clearance_cap_m}
-    t = time.process_time()
-    CollisionWorld(case.scene)
-    t_world, t = time.process_time() - t, time.process_time()
-    ClearanceGrid.build(case.scene, **how)
-    t_grid = time.process_time() - t
+    t_world, _ = cpu_s(CollisionWorld, case.scene)
+    t_grid, _ = cpu_s(lambda: ClearanceGrid.build(case.scene, **how))
     print(f"{case.name}: {case.scene.n_triangles} triangles")
     print(
         f"once a scene: FCL world {t_world:.2f} s, for all; clearance grid {t_grid:.2f} s, for ours ({shape} cells)"
@@ -241,16 +230,9 @@ def compare(case: Case, some: int, slow: int, seconds: float) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--targets", type=int, default=2)
-    parser.add_argument("--starts", type=int, default=170, help="starts a target; the dataset has 174")
-    parser.add_argument("--singles", type=int, default=40, help="goals with a single start")
-    parser.add_argument("--rounds", type=int, default=3, help="of single queries")
-    parser.add_argument("--some", type=int, default=40, help="pairs that each (b) gets in a regime")
-    parser.add_argument("--slow", type=int, default=8, help="pairs that (c) gets")
-    parser.add_argument("--seconds", type=float, default=3.0, help="time limit of (c), wall time")
-    parser.add_argument("--data", type=Path, default=Path("data"))
-    options = parser.parse_args()
+    options = options_of(
+        __doc__, targets=2, starts=170, singles=40, rounds=3, some=40, slow=8, seconds=3.0, data=Path("data")
+    )
     util.setLogLevel(util.LOG_ERROR)
     util.RNG.setSeed(1)
     size = (options.targets, options.starts, options.singles, options.rounds)

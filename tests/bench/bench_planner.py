@@ -2,29 +2,29 @@
 
     python tests/bench/bench_planner.py [--targets 6] [--starts 60] [--exact 0]
 
-Times are CPU seconds of this process, so that a busy machine distorts them less.
+`--starts` is of each target, and `--exact` the number of its routes that an exhaustive search repeats. Times are CPU
+seconds of this process, so that a busy machine distorts them less.
 """
 
 from __future__ import annotations
 
-import argparse
 import sys
-import time
 from collections import Counter
 from pathlib import Path
 
 import numpy as np
 import trimesh
+from common import cpu_s, options_of
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from support.flying import turned
 from support.handmade import box, instance
 
 from aerialdojo_gen.base.config.sections import PlanConfig, SearchAttempt
-from aerialdojo_gen.planning.certify import certify, clearance_profile
+from aerialdojo_gen.planning.certify import ClearanceProfile, certify, clearance_profile
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.collision import CollisionWorld
-from aerialdojo_gen.planning.planner import Planner
+from aerialdojo_gen.planning.planner import Planner, Route
 from aerialdojo_gen.scenes.model import Material, Scene
 
 SIZE = (120.0, 120.0, 25.0)
@@ -66,25 +66,19 @@ def free_pose(planner: Planner, rng: np.random.Generator, near=None, within: flo
             return np.array([*p, rng.uniform(-3.1, 3.1)])
 
 
-def clock() -> float:
-    return time.process_time()
+def certified(route: Route, grid: ClearanceGrid, world: CollisionWorld) -> ClearanceProfile:
+    profile = clearance_profile(np.ascontiguousarray(route.poses[:, :3]), RADIUS, grid.cap_m, grid.arrays)
+    assert certify(profile, RADIUS, world)
+    return profile
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--targets", type=int, default=6)
-    parser.add_argument("--starts", type=int, default=60, help="starts a target")
-    parser.add_argument("--exact", type=int, default=0, help="routes a target that an exhaustive search repeats")
-    options = parser.parse_args()
+    options = options_of(__doc__, targets=6, starts=60, exact=0)
     scene = world()
-    warm = Planner(scene, PlanConfig(), RADIUS)
-    warm.plan_target((60, 60, 22, 0), [(50, 50, 22, 0)])
-    t = clock()
-    collisions = CollisionWorld(scene)
-    t_fcl, t = clock() - t, clock()
-    ClearanceGrid.build(scene, margin_m=warm.config.margin_m)
-    t_grid = clock() - t
-    planner = warm
+    planner = Planner(scene, PlanConfig(), RADIUS)
+    planner.plan_target((60, 60, 22, 0), [(50, 50, 22, 0)])
+    t_fcl, collisions = cpu_s(CollisionWorld, scene)
+    t_grid, _ = cpu_s(lambda: ClearanceGrid.build(scene, margin_m=planner.config.margin_m))
     print(
         f"scene          {scene.n_triangles} triangles, {len(scene.instances)} instances, "
         f"grid {planner.grid.moves.shape}"
@@ -105,25 +99,16 @@ def main() -> None:
     for _ in range(options.targets):
         goal = free_pose(planner, rng)
         starts = np.array([free_pose(planner, rng) for _ in range(options.starts)])
-        t = clock()
-        found = planner.plan_target(goal, starts)
-        whole += clock() - t
+        seconds, found = cpu_s(planner.plan_target, goal, starts)
+        whole += seconds
         routes += found
-        t = clock()
-        planner._expand(goal)
-        t_field.append(clock() - t)
-        for start, route in zip(starts, found, strict=True):
-            if route.outcome == "SOLVED":
-                t = clock()
-                planner._search(start, goal, route.cost_to_go_m, planner._cost, planner.config.ladder)
-                plans.append(clock() - t)
-        for r in found:
+        t_field.append(cpu_s(planner._expand, goal)[0])
+        for start, r in zip(starts, found, strict=True):
             if r.outcome == "SOLVED":
-                t = clock()
-                points, grid = np.ascontiguousarray(r.poses[:, :3]), planner.grid
-                profile = clearance_profile(points, RADIUS, grid.cap_m, grid.arrays)
-                assert certify(profile, RADIUS, collisions)
-                certificates.append((clock() - t, len(profile.undecided), profile.undecided.sum()))
+                ways = (start, goal, r.cost_to_go_m, planner._cost, planner.config.ladder)
+                plans.append(cpu_s(planner._search, *ways)[0])
+                seconds, profile = cpu_s(certified, r, planner.grid, collisions)
+                certificates.append((seconds, len(profile.undecided), profile.undecided.sum()))
         if options.exact:
             some = [i for i, r in enumerate(found) if r.outcome == "SOLVED"][: options.exact]
             for i, b in zip(some, exact.plan_target(goal, starts[some]), strict=True):

@@ -7,7 +7,6 @@ Times are CPU seconds of the processes, so that a busy machine distorts them les
 
 from __future__ import annotations
 
-import argparse
 import multiprocessing
 import statistics
 import tempfile
@@ -17,6 +16,7 @@ from typing import Any
 
 import cv2
 import numpy as np
+from common import built, cpu_s, options_of
 
 from aerialdojo_gen.base.config.sections import RENDERERS, RenderConfig
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
@@ -24,17 +24,10 @@ from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.rendering.backend import choose_renderer, open_renderer
 from aerialdojo_gen.rendering.checks import Solid
 from aerialdojo_gen.rendering.recording import frame_poses, record_views
-from aerialdojo_gen.scenes.build import build_scene
-from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.store.schemas import VIEWS
 
-ASSETS = Path(__file__).resolve().parents[2] / "scene_assets"
 CAMERA = Camera(640, 640, 90.0)
-
-
-def built(name: str) -> Scene:
-    return build_scene(ASSETS / "scenes" / f"{name}.toml", load_catalogue(ASSETS))
 
 
 def route_of(scene: Scene, n: int) -> dict[str, Any]:
@@ -56,10 +49,8 @@ def record(scene: Scene, name: str, n: int) -> tuple[float, float]:
     poses = frame_poses(route_of(scene, n), config)
     with open_renderer(scene, name) as renderer, tempfile.TemporaryDirectory() as folder:
         renderer.render(CAMERA, view_pose(poses.position[0], 0.0, "front"))
-        begun = time.process_time()
-        record_views(renderer, solid, VIEWS, poses, config, Path(folder))
-        seconds = (time.process_time() - begun) / n
-        return seconds, sum(p.stat().st_size for p in Path(folder).iterdir()) / n / 1e3
+        seconds, _ = cpu_s(record_views, renderer, solid, VIEWS, poses, config, Path(folder))
+        return seconds / n, sum(p.stat().st_size for p in Path(folder).iterdir()) / n / 1e3
 
 
 def views_a_second(scene_name: str, renderer_name: str, n: int, barrier: Any, results: Any) -> None:
@@ -105,9 +96,8 @@ def compare(scene: Scene, n: int) -> None:
             for name, renderer in renderers.items():
                 if not milliseconds[name]:
                     renderer.render(CAMERA, pose)
-                begun = time.process_time()
-                pictures[name] = renderer.render(CAMERA, pose)
-                milliseconds[name].append(1e3 * (time.process_time() - begun))
+                seconds, pictures[name] = cpu_s(renderer.render, CAMERA, pose)
+                milliseconds[name].append(1e3 * seconds)
                 depth = pictures[name].depth_m
                 with np.errstate(invalid="ignore"):
                     right = (np.abs(depth - cast) < 0.01) | (np.isinf(depth) & np.isinf(cast))
@@ -131,14 +121,10 @@ def compare(scene: Scene, n: int) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--scene", action="append")
-    parser.add_argument("--poses", type=int, default=6)
-    args = parser.parse_args()
+    args = options_of(__doc__, scene=["U_Mall_0", "N_Forest_0"], poses=6)
     for name in RENDERERS:
         print(choose_renderer(name).why)
-    names = args.scene or ["U_Mall_0", "N_Forest_0"]
-    for name in names:
+    for name in args.scene:
         scene = built(name)
         print(f"{name}: {scene.n_triangles:,} triangles, {args.poses} poses of 4 views, 640 x 640")
         compare(scene, args.poses)
@@ -148,8 +134,10 @@ def main() -> None:
             print(f"  {renderer:>8}: {1e3 * end[renderer]:.0f} ms CPU a pose, encoded and checked; {size:.0f} kB")
         print(f"  end to end, gl is {end['pybullet'] / end['gl']:.1f} times as fast")
     for renderer in RENDERERS:
-        one, two = (parallel(names[0], renderer, args.poses, processes) for processes in (1, 2))
-        print(f"{names[0]}, {renderer}: {one:.1f} views/s by one process, {two:.1f} by two ({two / one:.2f} times)")
+        one, two = (parallel(args.scene[0], renderer, args.poses, processes) for processes in (1, 2))
+        print(
+            f"{args.scene[0]}, {renderer}: {one:.1f} views/s by one process, {two:.1f} by two ({two / one:.2f} times)"
+        )
 
 
 if __name__ == "__main__":

@@ -27,6 +27,7 @@ from itertools import permutations
 from pathlib import Path
 
 import numpy as np
+from common import ASSETS
 
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.geometry.rays import RayCaster
@@ -39,7 +40,6 @@ from aerialdojo_gen.scenes.worlds.kinds import load_type, type_names
 from aerialdojo_gen.scenes.worlds.make import MAX_DRAWS, make_world
 from aerialdojo_gen.scenes.worlds.world import World
 
-ASSETS = Path(__file__).resolve().parents[2] / "scene_assets"
 NEAR_M = 5.0
 # Seeds whose plans have digests in the repository; the first are those that are measured.
 SEEDS = (*range(1000, 1048), *range(200, 210), *range(10))

@@ -100,9 +100,9 @@ def _recordings() -> list[Case]:
 
     def pictures(folder: Path) -> None:
         for modality in ("rgb", "depth"):
-            with PngWriter(folder / f"front_{modality}", modality, comment=camera) as writer:
-                for k in range(2):
-                    writer.write({"rgb": colour + k, "depth": colour[..., 0].astype(np.uint16) + k})
+            writer = PngWriter(folder / f"front_{modality}", modality, comment=camera)
+            for k in range(2):
+                writer.write({"rgb": colour + k, "depth": colour[..., 0].astype(np.uint16) + k})
 
     return [made(videos), made(pictures)]
 

@@ -29,8 +29,8 @@ from aerialdojo_gen.rendering.backend import scene_renderer
 from aerialdojo_gen.rendering.codecs import VideoWriter
 from aerialdojo_gen.rendering.placement import TILED
 from aerialdojo_gen.rendering.reader import open_view, read_recording
+from aerialdojo_gen.rendering.recording import by_time
 from aerialdojo_gen.rendering.sample import choose_trajectories
-from aerialdojo_gen.rendering.trajectory import by_time
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.tables import from_rows

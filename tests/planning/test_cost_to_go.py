@@ -1,5 +1,3 @@
-import math
-
 import numpy as np
 import pytest
 from scipy.sparse import coo_array
@@ -7,20 +5,17 @@ from scipy.sparse.csgraph import dijkstra
 from support.flying import town
 from support.handmade import box, instance, scene
 
-from aerialdojo_gen.planning.attempt import lengths_at
 from aerialdojo_gen.planning.clearance import ClearanceGrid
-from aerialdojo_gen.planning.column_kernels import move_lengths
-from aerialdojo_gen.planning.connectivity import MOVES
-from aerialdojo_gen.planning.cost_to_go import columns_by_distance, cost_at, expand_cost, seed_goal
+from aerialdojo_gen.planning.connectivity import MOVES, move_lengths
+from aerialdojo_gen.planning.cost_to_go import cost_at, expand_cost, lengths_at, seed_goal
 from aerialdojo_gen.planning.preference import NO_PREFERENCE, Preference, clearance_cost_field
 
 
 def field(grid, goal, bound=200.0, prefer=NO_PREFERENCE):
     cost = np.full(grid.moves.shape, np.inf, np.float32)
     seeds = seed_goal(*goal, 0.0, 1.0, grid.radius_m, grid.arrays, grid.moves, cost, prefer)
-    order = columns_by_distance(math.ceil((bound + 2.0) / grid.arrays.cell))
     clearance_cost = clearance_cost_field(grid.arrays.field, prefer)
-    visits = expand_cost(seeds, order, bound, grid.arrays.cell, grid.moves, cost, clearance_cost)
+    visits = expand_cost(seeds, bound, bound + 2.0, grid.arrays, grid.moves, cost, clearance_cost)
     return cost, seeds, visits
 
 

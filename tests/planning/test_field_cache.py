@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 from support.flying import free_poses
 
-from aerialdojo_gen.planning.column_kernels import QUANTUM_M
+from aerialdojo_gen.planning.connectivity import QUANTUM_M
 from aerialdojo_gen.planning.field_cache import FieldCache
 
 FIELDS = arrays.arrays(

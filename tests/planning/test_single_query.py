@@ -12,11 +12,10 @@ from support.handmade import box, instance, scene
 
 from aerialdojo_gen.base.config.sections import PlanConfig, SearchAttempt
 from aerialdojo_gen.planning.clearance import ClearanceGrid
-from aerialdojo_gen.planning.cost_to_go import columns_by_distance, cost_at, expand_cost, seed_goal
-from aerialdojo_gen.planning.grid_path import make_path_arrays, short_path_cost
+from aerialdojo_gen.planning.cost_to_go import Area, cost_at, expand, expand_cost, make_memory, seed_goal
 from aerialdojo_gen.planning.planner import Planner, plan
 from aerialdojo_gen.planning.preference import Preference, clearance_cost_field
-from aerialdojo_gen.planning.query_field import clear_query, expand_query, make_query_arrays
+from aerialdojo_gen.planning.query_field import _clear, make_path_arrays, short_path_cost
 
 RADIUS = 0.25
 PREFER = Preference(1.0, 1.2, 0.4, 3.0)
@@ -95,14 +94,14 @@ def ground():
     whole = np.full(grid.moves.shape, np.inf, np.float32)
     seeds = seed_goal(*goal, 0.0, 1.0, grid.radius_m, grid.arrays, grid.moves, whole, PREFER)
     seeded = whole.ravel()[seeds]
-    expand_cost(seeds, columns_by_distance(400), 100.0, grid.arrays.cell, grid.moves, whole, clearance_cost)
+    expand_cost(seeds, 100.0, 200.0, grid.arrays, grid.moves, whole, clearance_cost)
     return grid, goal, clearance_cost, whole, seeds, seeded
 
 
 @pytest.mark.parametrize(("weight", "beyond"), [(1.0, 0.0), (1.05, 4.0), (1.6, 6.0)])
 def test_within_reach_costs_are_those_of_the_whole_field_to_the_bit(weight, beyond):
     grid, goal, clearance_cost, whole, seeds, seeded = ground()
-    cells, arrays = grid.arrays, make_query_arrays(grid.moves.shape)
+    cells, cost, memory = grid.arrays, np.full(whole.shape, np.inf, np.float32), make_memory(whole.shape)
     centres = [cells.origin[a] + (np.arange(n) + 0.5) * cells.cell for a, n in enumerate(whole.shape)]
     x, y, z = np.meshgrid(*centres, indexing="ij")
     for start in np.array([(14.0, -11.0, 2.0), (-13.2, 9.1, 6.5), (-4.0, -15.0, 0.9)]):
@@ -111,16 +110,17 @@ def test_within_reach_costs_are_those_of_the_whole_field_to_the_bit(weight, beyo
         within = away + weight * whole.astype(float) <= reach - 1e-6
         assert within.sum() > 100
         for _ in range(2):
-            arrays.cost.reshape(-1)[seeds] = seeded
-            n = expand_query(seeds, start, goal, 1.0, reach, weight, 100.0, cells, grid.moves, clearance_cost, arrays)
-            assert (arrays.cost[within] == whole[within]).all()
+            cost.reshape(-1)[seeds] = seeded
+            area = Area(start, goal, 1.0, weight, reach, 100.0, math.inf)
+            n, _ = expand(seeds, area, cells, grid.moves, cost, clearance_cost, memory)
+            assert (cost[within] == whole[within]).all()
             # Nothing is cheaper than it is, and most of the field is left alone.
-            assert (arrays.cost >= whole).all()
-            assert np.isfinite(arrays.cost).mean() < 0.7 * np.isfinite(whole).mean()
-            clear_query(n, seeds, arrays)
-            assert np.isinf(arrays.cost).all()
-            assert not arrays.last.any()
-            assert not arrays.waiting.any()
+            assert (cost >= whole).all()
+            assert np.isfinite(cost).mean() < 0.7 * np.isfinite(whole).mean()
+            _clear(n, seeds, cost, memory)
+            assert np.isinf(cost).all()
+            assert not memory.last.any()
+            assert not memory.waiting.any()
 
 
 def test_a_short_grid_path_is_little_longer_than_the_shortest():

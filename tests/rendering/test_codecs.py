@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 
 from aerialdojo_gen.base.errors import RenderError
 from aerialdojo_gen.rendering.codecs import MAX_DEPTH_M, VideoWriter, _frame, to_metres, to_stored
-from aerialdojo_gen.rendering.reader import read_recording
-from aerialdojo_gen.rendering.video import Video
+from aerialdojo_gen.rendering.reader import Video, read_recording
 
 N, H, W = 40, 96, 128
 U, V = np.meshgrid(np.arange(W), np.arange(H))

@@ -20,17 +20,11 @@ from aerialdojo_gen.base.config.sections import SearchAttempt
 from aerialdojo_gen.base.kernels import njit
 from aerialdojo_gen.dataset.validate.registry import Finding, check
 from aerialdojo_gen.dataset.validate.rows import Floats, Rows, SceneData
-from aerialdojo_gen.planning.attempt import costs_at
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.collision import CollisionWorld
-from aerialdojo_gen.planning.cost_to_go import columns_by_distance, expand_cost, seed_goal
+from aerialdojo_gen.planning.cost_to_go import cost_to_go, costs_at
 from aerialdojo_gen.planning.planner import Planner
-from aerialdojo_gen.planning.preference import (
-    NO_PREFERENCE,
-    approach_penalty,
-    clearance_cost_field,
-    clearance_penalty,
-)
+from aerialdojo_gen.planning.preference import approach_penalty, clearance_penalty
 from aerialdojo_gen.store.schemas import APPROACH
 
 _FITS = ("list_lengths_differ", "out_of_bounds", "route_length", "route_collision")
@@ -78,16 +72,11 @@ def long_way_round(data: SceneData, rows: Rows) -> Iterator[Finding]:
         data.mesh, cell_m=_CELL_M, radius_m=embodiment.radius_m, margin_m=plan.margin_m,
         cap_m=plan.clearance_cap_m,
     )  # fmt: skip
-    cost = np.empty(grid.moves.shape, np.float32)
-    wide = clearance_cost_field(grid.arrays.field, NO_PREFERENCE)
     longest = float(paths.length_m[fit].max())
-    order = columns_by_distance(math.ceil((longest + 2.0) / _CELL_M))
     places, owner = np.unique(goals[fit], axis=0, return_inverse=True)
     for g, goal in enumerate(places):
         own = fit[owner.ravel() == g]
-        cost.fill(np.inf)
-        seeds = seed_goal(*goal, 0.0, _CELL_M, grid.radius_m, grid.arrays, grid.moves, cost, NO_PREFERENCE)
-        expand_cost(seeds, order, longest, grid.arrays.cell, grid.moves, cost, wide)
+        cost = cost_to_go(np.append(goal, 0.0), grid, _CELL_M, longest, longest + 2.0)
         ways = np.asarray(costs_at(np.ascontiguousarray(paths.starts[own, :3]), grid.arrays, cost))
         over = paths.length_m[own] - ways
         for row in own[over > np.maximum(_LONGER_M, _LONGER_SHARE * ways)].tolist():

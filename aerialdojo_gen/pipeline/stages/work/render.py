@@ -16,9 +16,8 @@ from aerialdojo_gen.rendering.backend import scene_renderer
 from aerialdojo_gen.rendering.checks import FLAGS, FLAGS_OF_MODALITY, scene_solid
 from aerialdojo_gen.rendering.codecs import CODEC
 from aerialdojo_gen.rendering.placement import places
-from aerialdojo_gen.rendering.recording import frame_poses, record_views
+from aerialdojo_gen.rendering.recording import FramePoses, frame_poses, record_views
 from aerialdojo_gen.rendering.sample import choose_trajectories, tables
-from aerialdojo_gen.rendering.trajectory import FramePoses
 from aerialdojo_gen.scenes.light import chosen_light
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.store.files import sha256_of, size_of
