@@ -57,23 +57,25 @@ class Cache:
             number = os.open(path, os.O_RDONLY)
         except OSError:
             return None
+        # Where the file system knows no locks, what is used lately is what stays.
         with contextlib.suppress(OSError):
-            # Where the file system knows no locks, what is used lately is what stays.
             fcntl.flock(number, fcntl.LOCK_SH | fcntl.LOCK_NB)
-        try:
-            same = os.path.samestat(os.fstat(number), path.stat())
-            os.utime(path)
-        except OSError:
-            same = False
-        if not same:
-            os.close(number)
-            return None
+        with contextlib.suppress(OSError):
+            if os.path.samestat(os.fstat(number), path.stat()):
+                os.utime(path)
+                self._hold(path, number)
+                return path
+        os.close(number)
+        return None
+
+    def _hold(self, path: Path, number: int) -> None:
         with self._lock:
-            self._drop(path)
+            dropped = [self._held.pop(path)] if path in self._held else []
             self._held[path] = number
             while len(self._held) > _HELD:
-                self._drop(next(iter(self._held)))
-        return path
+                dropped.append(self._held.popitem(last=False)[1])
+        for number in dropped:
+            os.close(number)
 
     def make(self, name: str, fill: Callable[[Path], None]) -> Path:
         """Return an item's folder; where there is none, one is filled first."""
@@ -85,8 +87,7 @@ class Cache:
 
     def add(self, name: str, folder: Path) -> None:
         """Let a folder of `scratch` become an item; where it is there already, nothing changes."""
-        size = _size(folder)
-        path = self._place(name)
+        size, path = _size(folder), self._place(name)
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             with contextlib.suppress(FileExistsError):
@@ -106,12 +107,10 @@ class Cache:
         for path in self.folder.glob("[0-9a-f][0-9a-f]/*"):
             with contextlib.suppress(OSError):
                 items.append((path.stat().st_mtime, _size(path), path))
-        total = sum(size for _, size, _ in items)
+        excess = sum(size for _, size, _ in items) - self._most
         for _, size, path in sorted(items):
-            if total <= self._most:
-                return
-            if path != latest and self._remove(path):
-                total -= size
+            if excess > 0 and path != latest and self._remove(path):
+                excess -= size
 
     def _remove(self, path: Path) -> bool:
         with contextlib.suppress(OSError):
@@ -126,28 +125,16 @@ class Cache:
                 os.close(number)
         return False
 
-    def _drop(self, path: Path) -> None:
-        number = self._held.pop(path, None)
-        if number is not None:
-            os.close(number)
-
     def _place(self, name: str) -> Path:
         return self.folder / name[:2] / name
 
 
 def cache_folder() -> Path:
     """Return where copies are kept: ``$AERIALDOJO_CACHE``, or the user's cache folder."""
-    value = os.environ.get("AERIALDOJO_CACHE")
-    if value:
+    if value := os.environ.get("AERIALDOJO_CACHE"):
         return Path(value).expanduser().absolute()
-    base = os.environ.get("XDG_CACHE_HOME")
-    return (Path(base) if base else Path.home() / ".cache") / "aerialdojo-gen"
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "aerialdojo-gen"
 
 
 def _size(folder: Path) -> int:
-    total = 0
-    for found, _, names in os.walk(folder):
-        for name in names:
-            with contextlib.suppress(OSError):
-                total += (Path(found) / name).stat().st_size
-    return total
+    return sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())

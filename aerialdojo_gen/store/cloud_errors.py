@@ -11,11 +11,6 @@ _CREDENTIALS = (
     "set AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY (and AWS_SESSION_TOKEN where they are temporary), "
     "or AWS_PROFILE, or run aws configure"
 )
-_NO_CREDENTIALS = {"NoCredentialsError", "PartialCredentialsError", "CredentialRetrievalError", "NoAuthTokenError"}
-_OLD_CREDENTIALS = {"TokenRetrievalError", "SSOTokenLoadError", "UnauthorizedSSOTokenError"}
-_REFUSED = {"InvalidAccessKeyId", "SignatureDoesNotMatch", "ExpiredToken", "InvalidToken", "TokenRefreshRequired"}
-_DENIED = {"AccessDenied", "403", "Forbidden", "AllAccessDisabled", "AccountProblem"}
-_ELSEWHERE = {"PermanentRedirect", "301", "AuthorizationHeaderMalformed", "IllegalLocationConstraintException"}
 _MISSING = {"NoSuchKey", "404", "NotFound"}
 _CHANGED = {"PreconditionFailed", "412", "ConditionalRequestConflict", "409"}
 _BUSY = {
@@ -26,6 +21,27 @@ _UNREACHABLE = {
     "EndpointConnectionError", "ConnectTimeoutError", "ReadTimeoutError", "ConnectionClosedError", "SSLError",
     "ProxyConnectionError", "HTTPClientError", "ConnectionError", "ResponseStreamingError", "IncompleteReadError",
 }  # fmt: skip
+# Names of the client's errors or codes that stores answer with, and what each means.
+_EXPLAINED = (
+    ({"NoCredentialsError", "PartialCredentialsError", "CredentialRetrievalError", "NoAuthTokenError"},
+     f"there are no credentials: {_CREDENTIALS}"),
+    ({"TokenRetrievalError", "SSOTokenLoadError", "UnauthorizedSSOTokenError"},
+     "the session has expired: run aws sso login, or set other credentials"),
+    ({"ProfileNotFound"},
+     "there is no AWS profile of the name that AWS_PROFILE says: correct it, or run aws configure"),
+    ({"InvalidAccessKeyId", "SignatureDoesNotMatch", "ExpiredToken", "InvalidToken", "TokenRefreshRequired"},
+     f"the store refuses the credentials ({{code}}): {_CREDENTIALS}"),
+    ({"NoSuchBucket"}, "there is no bucket {bucket!r} at {endpoint}: make it, or correct --data"),
+    ({"AccessDenied", "403", "Forbidden", "AllAccessDisabled", "AccountProblem"},
+     "access is denied: the credentials need s3:ListBucket, s3:GetObject, s3:PutObject, s3:DeleteObject and "
+     "s3:AbortMultipartUpload there"),
+    ({"PermanentRedirect", "301", "AuthorizationHeaderMalformed", "IllegalLocationConstraintException"},
+     "the bucket is of another region: set AWS_DEFAULT_REGION to it"),
+    (_BUSY, f"the store keeps answering {{code}}: run the command again later; {_KEPT}"),
+    (_UNREACHABLE,
+     "{endpoint} cannot be reached, does not answer or drops the connection: check the network and "
+     f"AWS_ENDPOINT_URL, and run the command again; {_KEPT}"),
+)  # fmt: skip
 
 
 class Changed(Exception):  # noqa: N818 - it says what happened
@@ -40,56 +56,28 @@ def code_of(error: BaseException) -> str:
 
 def is_transient(error: BaseException) -> bool:
     """Whether to ask again may help."""
-    return code_of(error) in _BUSY or bool(_names(error) & _UNREACHABLE) or isinstance(error, OSError)
+    return bool(_kinds(error) & (_BUSY | _UNREACHABLE)) or isinstance(error, OSError)
 
 
-def _names(error: BaseException) -> set[str]:
-    return {kind.__name__ for kind in type(error).__mro__}
+def _kinds(error: BaseException) -> set[str]:
+    return {code_of(error), *(kind.__name__ for kind in type(error).__mro__)}
 
 
 def cloud_error(error: Exception, url: str, endpoint: str | None) -> Exception | None:
     """Return what to raise for an error of the client; None where it is a defect of ours."""
-    code, names = code_of(error), _names(error)
-    bucket = url.removeprefix("s3://").partition("/")[0]
+    code, kinds = code_of(error), _kinds(error)
     if code in _MISSING:
         return FileNotFoundError(2, "no such object", url)
     if code in _CHANGED:
         return Changed(url)
-    if why := _explained(code, names, bucket, endpoint):
-        return StoreError(f"{url}: {why}")
+    for known, why in _EXPLAINED:
+        if kinds & known:
+            bucket = url.removeprefix("s3://").partition("/")[0]
+            return StoreError(f"{url}: {why.format(code=code, bucket=bucket, endpoint=endpoint)}")
     if code:
-        message = first_line(error)
-        return StoreError(f"{url}: the store refuses ({message}); {_KEPT}")
-    if names & {"BotoCoreError", "ValueError"}:
+        return StoreError(f"{url}: the store refuses ({first_line(error)}); {_KEPT}")
+    if kinds & {"BotoCoreError", "ValueError"}:
         return StoreError(f"{url}: {first_line(error)}: correct the AWS configuration or --data")
     if isinstance(error, OSError):
         return StoreError(f"{url}: {error.strerror or first_line(error)}; {_KEPT}")
     return None
-
-
-def _explained(code: str, names: set[str], bucket: str, endpoint: str | None) -> str:
-    if names & _NO_CREDENTIALS:
-        return f"there are no credentials: {_CREDENTIALS}"
-    if names & _OLD_CREDENTIALS:
-        return "the session has expired: run aws sso login, or set other credentials"
-    if "ProfileNotFound" in names:
-        return "there is no AWS profile of the name that AWS_PROFILE says: correct it, or run aws configure"
-    if code in _REFUSED:
-        return f"the store refuses the credentials ({code}): {_CREDENTIALS}"
-    if code == "NoSuchBucket":
-        return f"there is no bucket {bucket!r} at {endpoint}: make it, or correct --data"
-    if code in _DENIED:
-        return (
-            "access is denied: the credentials need s3:ListBucket, s3:GetObject, s3:PutObject, s3:DeleteObject and "
-            "s3:AbortMultipartUpload there"
-        )
-    if code in _ELSEWHERE:
-        return "the bucket is of another region: set AWS_DEFAULT_REGION to it"
-    if code in _BUSY:
-        return f"the store keeps answering {code}: run the command again later; {_KEPT}"
-    if names & _UNREACHABLE:
-        return (
-            f"{endpoint} cannot be reached, does not answer or drops the connection: check the network and "
-            f"AWS_ENDPOINT_URL, and run the command again; {_KEPT}"
-        )
-    return ""
