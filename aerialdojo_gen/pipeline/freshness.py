@@ -6,7 +6,6 @@ matches.
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -111,25 +110,6 @@ def is_fresh(stage: Stage, config: Section, scene: str, pipeline: Pipeline, root
         return False
     quiet = Reporter(quiet=True)
     return all(_fresh(stage, roots.data, scene, k, parts, fingerprint, quiet) is not None for k in range(parts))
-
-
-def prefetch_digests(stage: Stage, scenes: Sequence[str], roots: ProjectPaths) -> None:
-    """Start reading the files whose digests show whether a stage's shards are undamaged."""
-    names = []
-    for scene in scenes:
-        for table in stage.writes:
-            with contextlib.suppress(AerialDojoError):
-                infos = [store.read_info(roots.data, name) for name in store.shards(roots.data, table, scene)]
-                names += [name for info in infos for name, file in info.files.items() if file.sha256]
-    roots.data.prefetch_digests(names)
-
-
-def cache_footers(stages: Sequence[Stage], scenes: Sequence[str], roots: ProjectPaths) -> None:
-    """Cache the footers of stages' shards for the next run."""
-    for stage in stages:
-        for scene in scenes:
-            for table in stage.writes:
-                store.cache_footers(roots.data, store.shards(roots.data, table, scene))
 
 
 def _fresh(

@@ -15,7 +15,7 @@ from aerialdojo_gen.base.errors import AerialDojoError, AssetError, BudgetSpent,
 from aerialdojo_gen.base.names import choose_scenes, unknown
 from aerialdojo_gen.pipeline.code_digest import stage_code
 from aerialdojo_gen.pipeline.executors import Executor, SharedPaths, make_executor, on_disk
-from aerialdojo_gen.pipeline.freshness import ShardFinder, prefetch_digests
+from aerialdojo_gen.pipeline.freshness import ShardFinder
 from aerialdojo_gen.pipeline.interrupt import Interrupts
 from aerialdojo_gen.pipeline.options import RunLimits, RunOptions
 from aerialdojo_gen.pipeline.progress import Reporter, duration
@@ -44,9 +44,6 @@ def run(
     options, reporter = options or RunOptions(workers=1), reporter or Reporter(quiet=True)
     started = time.monotonic()
     summaries: list[StageSummary] = []
-    for first in stages[:1]:
-        if first.name not in options.force:
-            prefetch_digests(first, scenes, roots)
     for stage in stages:
         # Digest all code now, as loaded: edits during the run make the shards stale next time.
         stage_code(stage.name)

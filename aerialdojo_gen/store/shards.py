@@ -9,8 +9,6 @@ Every function takes a data root, or a directory or URL to open as one.
 
 from __future__ import annotations
 
-import contextlib
-import time
 from collections.abc import Collection, Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
@@ -20,7 +18,7 @@ import pyarrow as pa
 
 from aerialdojo_gen.base.cli_context import command
 from aerialdojo_gen.base.errors import DamagedFile, StoreError, first_line
-from aerialdojo_gen.store.footers import ShardFile, ShardInfo, decode, encode, footer_cache
+from aerialdojo_gen.store.footers import ShardFile, ShardInfo, decode, encode
 from aerialdojo_gen.store.layout import (
     LAYOUT,
     Place,
@@ -80,9 +78,6 @@ def read_info(data: Where, name: str) -> ShardInfo:
 @lru_cache(maxsize=8192)
 def _read_info(root: DataRoot, name: str, version: str) -> ShardInfo:
     # A shard is never written to, only replaced; a run asks for the same footer half a dozen times.
-    known, begun_ns = footer_cache(), time.time_ns()
-    if known is not None and (cached := known.find(root, name, version)) is not None:
-        return cached
     from aerialdojo_gen.store.parquet_files import read_footer
 
     where, hint = root.at(name), "delete it and run the command again"
@@ -101,19 +96,7 @@ def _read_info(root: DataRoot, name: str, version: str) -> ShardInfo:
         raise DamagedFile(f"{where} is damaged ({error}): {hint}") from None
     if info.rows != rows:
         raise DamagedFile(f"{where} has {rows:,} rows where {info.rows:,} were written: {hint}")
-    if known is not None:
-        known.record(root, name, version, begun_ns, info)
     return info
-
-
-def cache_footers(root: DataRoot, names: Sequence[str]) -> None:
-    """Let the `FooterCache` keep what shards' footers say; those that are damaged are left out."""
-    if footer_cache() is None:
-        return
-    for name in names:
-        with contextlib.suppress(StoreError, OSError):
-            # Read once more what was read as soon as it was written: a change right after that could hide.
-            _read_info.__wrapped__(root, name, root.version(name))
 
 
 def count_rows(data: Where, table: str, scene: str) -> int:
