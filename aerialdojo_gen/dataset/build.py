@@ -194,7 +194,7 @@ def run_stages(
             _finish_release(config, roots.data, names, ready, not scenes, reporter)
 
     summaries = runner.run(
-        stages, names, config, roots, options=options, reporter=reporter, prepare=prepare, finish=finish,
+        stages, ready, config, roots, options=options, reporter=reporter, prepare=prepare, finish=finish,
     )  # fmt: skip
     exact = config.split.paper_counts or config.annotate_import.paper_counts
     owed = [line for name, line in left_out.items() if exact or name in (scenes or config.scenes)]

@@ -74,7 +74,7 @@ class ShardFinder:
         for scene in scenes:
             try:
                 fingerprint = scene_fingerprint(stage, pipeline, roots, scene)
-                parts = stage.parts(roots.data, scene, config)
+                parts = stage.count_parts(roots.data, scene, config)
             except AerialDojoError as error:
                 found.errors[scene] = error
                 continue
@@ -105,7 +105,7 @@ def is_fresh(stage: Stage, config: Section, scene: str, pipeline: Pipeline, root
     pipeline = pipeline.model_copy(update={stage.name.replace("-", "_"): config})
     try:
         fingerprint = scene_fingerprint(stage, pipeline, roots, scene)
-        parts = stage.parts(roots.data, scene, config)
+        parts = stage.count_parts(roots.data, scene, config)
     except AerialDojoError:
         return False
     quiet = Reporter(quiet=True)
@@ -137,24 +137,19 @@ def _fresh(
 
 
 def _verified(stage: Stage, data: DataRoot, scene: str, part: int, reporter: Reporter) -> bool:
-    """Whether the files of a fresh shard have the recorded digests."""
-    if stage.digests is None:
+    """Whether the files of a fresh shard have the digests that the rows of `recordings` say."""
+    if "recordings" not in stage.writes:
         return True
     from aerialdojo_gen.store.parquet_files import read_file
 
-    table, *columns = stage.digests
     try:
-        name = store.shard_name(table, scene, part)
-        rows = read_file(data.local_copy(name), columns, data.at(name))
+        name = store.shard_name("recordings", scene, part)
+        rows = read_file(data.local_copy(name), ["path", "sha256", "bytes"], data.at(name)).to_pylist()
     except DamagedFile as error:
         reporter.line(f"{error}: computed again")
         return False
-    for relative, digest in zip(*(rows.column(name).to_pylist() for name in columns), strict=True):
-        try:
-            same = data.digest(relative, reread=True) == digest
-        except OSError:
-            same = False
-        if not same:
-            reporter.line(f"{data.at(relative)} has other content than was written: computed again")
+    for row in rows:
+        if not data.is_whole(row["path"], row["bytes"], row["sha256"], reread=True):
+            reporter.line(f"{data.at(row['path'])} has other content than was written: computed again")
             return False
     return True

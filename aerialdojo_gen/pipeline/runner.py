@@ -40,7 +40,7 @@ def run(
     prepare: Callable[[], None] | None = None,
     finish: Callable[[], None] | None = None,
 ) -> list[StageSummary]:
-    """Run stages in order on the scenes that have their inputs."""
+    """Run stages in order on scenes that lack no input from their author (`scenes_missing_input`)."""
     options, reporter = options or RunOptions(workers=1), reporter or Reporter(quiet=True)
     started = time.monotonic()
     summaries: list[StageSummary] = []
@@ -49,8 +49,6 @@ def run(
         stage_code(stage.name)
     sources = (roots.scene_assets, roots.recipes, roots.annotations)
     folders = SharedPaths(on_disk(roots.data), sources, on_disk(roots.data), reporter.line)
-    left_out = scenes_missing_input(stages, scenes, roots)
-    scenes = [scene for scene in scenes if scene not in left_out]
     executor_of_run = make_executor(options.executor, options.workers, options.address, folders)
     with roots.data.lock(), Interrupts() as interrupts, executor_of_run as pool:
         if prepare:
@@ -101,7 +99,7 @@ def group_stages(stages: Sequence[Stage], *, alone: bool = False) -> list[list[S
     """Group stages between barriers: within a group scenes advance independently."""
     groups: list[list[Stage]] = []
     for stage in stages:
-        if not groups or stage.waits or (alone and stage is stages[-1]):
+        if not groups or stage.barrier or (alone and stage is stages[-1]):
             groups.append([])
         groups[-1].append(stage)
     return groups

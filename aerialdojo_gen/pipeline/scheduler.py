@@ -58,7 +58,7 @@ class SceneScheduler(TaskQueue[Task]):
     def alone(self) -> bool:
         """Whether there is never more than one task at a time."""
         passed = {scene: passed for scene, passed in self._passed.items() if scene not in self._ended}
-        in_parts = any(stage.in_parts for stage in self._stages[min(passed.values(), default=0) :])
+        in_parts = any(stage.parts for stage in self._stages[min(passed.values(), default=0) :])
         return len(self) <= 1 and len(passed) <= 1 and not (passed and in_parts)
 
     @property

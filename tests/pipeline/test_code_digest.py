@@ -41,7 +41,6 @@ STALE = {
     "imports/import_mesh.py": set(),
     "pipeline/runner.py": set(),
     "pipeline/registry.py": set(),
-    "pipeline/stages/hooks.py": set(),
     "pipeline/stages/work/filter.py": {"filter"},
     "pipeline/stages/work/quota.py": {"plan", "split"},
     "pipeline/scoring/geometric.py": {"anchor-sample"},
