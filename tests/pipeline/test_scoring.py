@@ -17,8 +17,7 @@ from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.geometry.surface import Surface
 from aerialdojo_gen.pipeline.scoring.base import AnchorView, CandidateMeasures
 from aerialdojo_gen.pipeline.scoring.ensemble import ScorerEnsemble, scorer_ensemble
-from aerialdojo_gen.pipeline.scoring.geometric import WEIGHTS, Parts, judge
-from aerialdojo_gen.pipeline.scoring.recognisability import front_score, part_score
+from aerialdojo_gen.pipeline.scoring.geometric import WEIGHTS, Parts, front_score, judge, part_score
 from aerialdojo_gen.pipeline.stages.work.anchor_sample import anchors_of
 from aerialdojo_gen.pipeline.stages.work.anchor_world import Candidates
 from aerialdojo_gen.rendering.backend import check_renderer, open_renderer, probe_scene

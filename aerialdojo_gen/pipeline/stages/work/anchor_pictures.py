@@ -13,8 +13,7 @@ from aerialdojo_gen.base.config.sections import AnchorSampleConfig
 from aerialdojo_gen.geometry.viewpoints import level_marks, shortlist
 from aerialdojo_gen.pipeline.scoring.base import AnchorView
 from aerialdojo_gen.pipeline.scoring.ensemble import Verdict, scorer_ensemble
-from aerialdojo_gen.pipeline.scoring.geometric import most
-from aerialdojo_gen.pipeline.scoring.recognisability import clarity_score
+from aerialdojo_gen.pipeline.scoring.geometric import clarity_score, most
 from aerialdojo_gen.pipeline.stages.work.anchor_world import Candidates
 from aerialdojo_gen.pipeline.stages.work.camera_pullback import part_limit_m, steps_back_m
 

@@ -18,7 +18,7 @@ from aerialdojo_gen.geometry.rays import RayCaster, TriangleRayCaster, instance_
 from aerialdojo_gen.geometry.surface import Surface
 from aerialdojo_gen.geometry.viewpoints import PointVisibility, Views, informativeness
 from aerialdojo_gen.pipeline.scoring.base import AnchorView, CandidateMeasures
-from aerialdojo_gen.pipeline.scoring.recognisability import front_score, part_score, recognisability
+from aerialdojo_gen.pipeline.scoring.geometric import front_score, part_score, recognisability
 from aerialdojo_gen.pipeline.scoring.views import take_view
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.rendering.casters import ray_caster
