@@ -17,8 +17,6 @@ from aerialdojo_gen.base.errors import Malformed
 from aerialdojo_gen.base.safe_parse import loads_json
 
 _KEYS = frozenset({"fingerprint", "content", "columns", "rows", "parts", "summary", "files", "checksum"})
-# Of a footer that vouches for nothing; logs and releases of then are still read.
-_EARLIER_KEYS = _KEYS - {"columns", "checksum"}
 _Count = Annotated[int, Field(strict=True, ge=0)]
 _Digest = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
 _HalfDigest = Annotated[str, Field(pattern=r"^[0-9a-f]{32}$")]
@@ -47,8 +45,7 @@ class ShardInfo:
 
     fingerprint: str  # Of the code, configuration, inputs and assets that it was made from
     content: _Digest  # SHA-256 of the rows
-    # `aerialdojo_gen.store.tables.column_digests`; empty where an earlier version wrote it
-    columns: dict[str, _HalfDigest]
+    columns: dict[str, _HalfDigest]  # `aerialdojo_gen.store.tables.column_digests`
     rows: _Count  # Rows in the shard; shards of the scene
     parts: _Count
     # The stage's ``rows_in``, ``rows_out`` and ``counts`` of the shard
@@ -66,16 +63,14 @@ def encode(info: ShardInfo) -> bytes:
 
 
 def decode(raw: bytes) -> ShardInfo:
-    """Read what `encode` wrote, or an earlier version, whose footers have no checksums."""
+    """Read what `encode` wrote; ValueError where it is something else."""
     try:
         fields = loads_json(raw)
     except Malformed:
         raise ValueError("its footer is no JSON") from None
     if not isinstance(fields, dict):
         raise ValueError("its footer is no JSON object")
-    if fields.keys() == _EARLIER_KEYS and isinstance(fields["files"], dict):
-        fields = fields | {"columns": {}, "files": {name: [size, ""] for name, size in fields["files"].items()}}
-    elif fields.keys() != _KEYS or fields.pop("checksum") != _checksum(fields):
+    if fields.keys() != _KEYS or fields.pop("checksum") != _checksum(fields):
         raise ValueError("its footer's checksum is wrong")
     # A right checksum says only that some program wrote it.
     try:
