@@ -38,8 +38,9 @@ MEASURES = ("seen", "framed", "open", "told", "parts", "front")
 
 
 def measures(found, chosen, radius_m, config):
-    looked = CandidateViews.of(found, np.array(chosen), config)
-    for view in looked.pictures(np.arange(len(chosen)), config.picture_px, config.fov_deg):
+    looked = CandidateViews.of(found, np.array(chosen))
+    for n in range(len(chosen)):
+        view = looked.picture(n, config.picture_px)
         terms = judge(view, radius_m, config.standoff_m)
         front = None if view.off_front_rad is None else view.off_front_rad <= FRONT_RAD
         yield [terms.unoccluded, terms.framed, terms.open, terms.shown, terms.tells, front]

@@ -27,7 +27,7 @@ def item(thing, object_id=0):
 
 def find(place, node, tmp_path, config=CONFIG, seed=0):
     job = job_of("anchor-sample", tmp_path, seed=seed)
-    return anchors_of(item(place[node]), World.of(place, RADIUS, CONFIG.margin_m), job, config)
+    return anchors_of(item(place[node]), World.of(place, RADIUS, CONFIG.margin_m), job, config)[:2]
 
 
 def place_of(row):

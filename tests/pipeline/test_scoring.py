@@ -35,8 +35,8 @@ def all_terms(place, thing, *poses):
     world = world_of(place)
     points = Surface.of(thing).sample(400, np.random.default_rng(0))
     at = np.array(poses)
-    found = Candidates.of(world, world.index[thing.node], points, at[:, :3], at[:, 3], RADIUS, CONFIG)
-    return [judge(found.picture(k, 128, 90.0), RADIUS, CONFIG.standoff_m) for k in range(len(poses))]
+    found = Candidates(world, world.index[thing.node], points, at[:, :3], at[:, 3], RADIUS, CONFIG)
+    return [judge(found.picture(k, 128), RADIUS, CONFIG.standoff_m) for k in range(len(poses))]
 
 
 def terms(place, thing, position, yaw):
@@ -174,7 +174,7 @@ def test_every_term_and_the_score_lie_in_the_unit_interval(seed, shown, elevatio
 
 
 def test_rows_hold_the_scores_their_parts_and_a_thumbnail(tmp_path):
-    rows, rejected = anchors_of(
+    rows, rejected, _ = anchors_of(
         item_of(POST, "post"), world_of(yard(POST)), job_of("anchor-sample", tmp_path), CONFIG
     )
     assert sum(rejected.values()) + len(rows) >= 24
@@ -196,7 +196,7 @@ def test_only_the_best_few_are_pictured(tmp_path, monkeypatch):
     picture = Candidates.picture
     monkeypatch.setattr(Candidates, "picture", lambda self, k, *a: taken.append(k) or picture(self, k, *a))
     config = AnchorSampleConfig(pictured=5)
-    rows, rejected = anchors_of(
+    rows, rejected, _ = anchors_of(
         item_of(POST, "post"), world_of(yard(POST)), job_of("anchor-sample", tmp_path), config
     )
     # Fewer where no other can be chosen any more.

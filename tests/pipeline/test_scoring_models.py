@@ -32,7 +32,7 @@ def clip(tmp_path_factory):
 
 
 def selected(config, name, folder):
-    rows, _ = anchors_of(item_of(POST, name), world_of(yard(POST)), job_of("anchor-sample", folder), config)
+    rows, *_ = anchors_of(item_of(POST, name), world_of(yard(POST)), job_of("anchor-sample", folder), config)
     assert rows[0]["selected"]
     return rows
 

@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.base.config.sections import AnchorSampleConfig
 from aerialdojo_gen.geometry.viewpoints import level_marks, shortlist
 from aerialdojo_gen.pipeline.scoring.base import AnchorView
 from aerialdojo_gen.pipeline.scoring.ensemble import Verdict, scorer_ensemble
@@ -34,9 +33,9 @@ class CandidateViews:
     rank: Floats  # (k,) float64; ray-cast score of both positions
 
     @classmethod
-    def of(cls, found: Candidates, which: NDArray[np.int64], config: AnchorSampleConfig) -> CandidateViews:
+    def of(cls, found: Candidates, which: NDArray[np.int64]) -> CandidateViews:
         """Look from behind the candidates `which` (k,)."""
-        places, yaws = found.positions_m[which], found.yaw_rad[which]
+        config, places, yaws = found.config, found.positions_m[which], found.yaw_rad[which]
         limits_m = [
             part_limit_m(found.patches, found.seen[k], places[n], float(yaws[n]), config.fov_deg)
             for n, k in enumerate(which)
@@ -50,15 +49,14 @@ class CandidateViews:
         rank = (found.rank[which] + behind.rank) / 2.0 * clear
         return cls(found, which, backs, behind, rank)
 
-    def pictures(self, few: NDArray[np.int64], size_px: int, fov_deg: float) -> list[AnchorView]:
-        """Picture candidates; what is shown is the mean of the view and of the one from behind where there is one."""
-        return [self.picture(n, size_px, fov_deg) for n in few.tolist()]
+    def picture(self, n: int, size_px: int, back: AnchorView | None = None) -> AnchorView:
+        """Picture a candidate, a number among `which`; the view from behind, if any, may be there already.
 
-    def picture(self, n: int, size_px: int, fov_deg: float, back: AnchorView | None = None) -> AnchorView:
-        """Picture one candidate, a number among `which`; see `pictures`. The one from behind may be there already."""
-        view = self.found.picture(int(self.which[n]), size_px, fov_deg)
+        What is shown is the mean of both.
+        """
+        view = self.found.picture(int(self.which[n]), size_px)
         if self.has_back(n):
-            back = back or self.behind.picture(n, size_px, fov_deg)
+            back = back or self.behind.picture(n, size_px)
             known = replace(
                 view.known, shown=(view.known.shown + back.known.shown) / 2.0,
                 part_visibility=_mean(view.known.part_visibility, back.known.part_visibility),
@@ -70,7 +68,7 @@ class CandidateViews:
         """Whether the reference picture of a candidate, a number among `which`, is taken from behind it."""
         return bool(self.step_back_m[n] > 0.0)
 
-    def most(self, n: int, radius_m: float, standoff_m: float, back: AnchorView | None = None) -> float:
+    def most(self, n: int, back: AnchorView | None = None) -> float:
         """Bound the geometric score of number n of `which` from above without its picture; one from behind helps."""
         known, behind = self.found.measures(int(self.which[n])), self.behind
         if self.has_back(n):
@@ -79,7 +77,7 @@ class CandidateViews:
                 known, shown=(known.shown + float(behind.views.shown[n])) / 2.0,
                 part_visibility=_mean(known.part_visibility, seen), framed_behind=float(behind.views.framed[n]),
             )  # fmt: skip
-        return most(known, radius_m, standoff_m, back)
+        return most(known, self.found.radius_m, self.found.config.standoff_m, back)
 
 
 def best_pictured(
@@ -88,19 +86,20 @@ def best_pictured(
     few: NDArray[np.int64],
     azimuth_rad: Floats,
     front: NDArray[np.bool_],
-    radius_m: float,
-    config: AnchorSampleConfig,
 ) -> tuple[NDArray[np.int64], list[tuple[AnchorView, Verdict]]]:
     """Picture candidates that could be among the best, and shortlist: indices (k,) into `few` and their verdicts."""
-    scorers, separation_rad = scorer_ensemble(config, radius_m), math.radians(config.separation_deg)
-    weights = config.weights
-    if weights.clip or weights.vlm:
-        views = candidate_views.pictures(few, max(config.picture_px, _MODEL_PX), config.fov_deg)
+    config = candidate_views.found.config
+    scorers, separation_rad = (
+        scorer_ensemble(config, candidate_views.found.radius_m),
+        math.radians(config.separation_deg),
+    )
+    if config.weights.clip or config.weights.vlm:
+        views = [candidate_views.picture(n, max(config.picture_px, _MODEL_PX)) for n in few.tolist()]
         found = dict(enumerate(zip(views, scorers.judge(name, views), strict=True)))
         score = np.array([verdict.score for _, verdict in found.values()])
     else:
         found = {}
-        score = np.array([candidate_views.most(n, radius_m, config.standoff_m) for n in few.tolist()])
+        score = np.array([candidate_views.most(n) for n in few.tolist()])
     backs: dict[int, AnchorView] = {}
     while True:
         # A shortlist of exact scores only is final: bounds are never below scores.
@@ -112,10 +111,10 @@ def best_pictured(
         n = open_ones[0]
         which = int(few[n])
         if candidate_views.has_back(which) and n not in backs:
-            backs[n] = candidate_views.behind.picture(which, config.picture_px, config.fov_deg)
-            score[n] = candidate_views.most(which, radius_m, config.standoff_m, backs[n])
+            backs[n] = candidate_views.behind.picture(which, config.picture_px)
+            score[n] = candidate_views.most(which, backs[n])
             continue
-        view = candidate_views.picture(which, config.picture_px, config.fov_deg, backs.get(n))
+        view = candidate_views.picture(which, config.picture_px, backs.get(n))
         found[n] = view, scorers.judge(name, [view])[0]
         score[n] = found[n][1].score
 

@@ -113,10 +113,13 @@ class PaperQuota(CandidatePolicy):
         outcome = np.where(np.isfinite(predicted), "SOLVED", "NO_PATH")
         reason, setting = self._judge(rows, outcome, predicted, np.zeros(len(rows)))
         likely = np.flatnonzero(reason == KEPT)
-        order = self._rank(likely, setting[likely], predicted[likely])
+        # A difficulty level counts by its probability.
+        detoured = 1.0 / (1.0 + exp(-(self._detour(likely, predicted[likely]) - DETOUR) / _DETOUR_SPREAD))
+        levels = detoured + (candidates.visible[likely] == 0.0)
+        order = rank_candidates(self._accepted(likely, setting[likely], predicted[likely], levels), *self._rules)
         # Candidates predicted to be rejected come last, the shortest first: some are kept after all.
         unlikely = np.flatnonzero((reason != KEPT) & np.isfinite(predicted))
-        self._order = {name: order[name] for name in SETTINGS}
+        self._order = {name: likely[order[name]] for name in SETTINGS}
         self._last = unlikely[np.argsort(predicted[unlikely], kind="stable")]
         return self._within_margin()
 
@@ -162,13 +165,6 @@ class PaperQuota(CandidatePolicy):
 
     def _detour(self, rows: Integers, length_m: Floats) -> Floats:
         return np.asarray(length_m / np.maximum(self._candidates.free_length_m[rows], 1e-12))
-
-    def _rank(self, rows: Integers, setting: NDArray[np.str_], length_m: Floats) -> dict[str, Integers]:
-        # A difficulty level counts by its probability.
-        likely = 1.0 / (1.0 + exp(-(self._detour(rows, length_m) - DETOUR) / _DETOUR_SPREAD))
-        levels = likely + (self._candidates.visible[rows] == 0.0)
-        kept = self._accepted(rows, setting, length_m, levels)
-        return {name: rows[place] for name, place in rank_candidates(kept, *self._rules).items()}
 
     def _accepted(
         self, rows: Integers, setting: NDArray[np.str_], length_m: Floats, levels: Floats | Integers

@@ -76,47 +76,29 @@ def select_quota(
 def rank_candidates(
     kept: Accepted, counts: Mapping[str, int], path_m: float, seed: int, preference: float = 0.0
 ) -> dict[str, NDArray[np.int64]]:
-    """Rows of each setting's tasks in the order of selection by `select_quota`."""
-    groups = _groups(kept, counts)
-    scores = _score(kept, counts, groups, path_m, seed, preference)
-    return {name: _best(scores, rows) for name, rows in groups.items()}
-
-
-def _groups(kept: Accepted, counts: Mapping[str, int]) -> dict[str, NDArray[np.int64]]:
-    """Rows of each setting, by key: ties are broken by it, not by row order."""
+    """Rows of each setting's tasks in the order of selection by `select_quota`, the best Gumbel scores first."""
+    # By key: ties are broken by it, not by row order.
     by_key = np.argsort(np.asarray(kept.sampling_keys))
-    settings = np.asarray(kept.settings)[by_key]
-    return {name: by_key[settings == name] for name in sorted(counts)}
-
-
-def _best(scores: Floats, rows: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Sort rows by their scores, the largest first."""
-    return rows[np.argsort(-scores[rows], kind="stable")]
-
-
-def _score(
-    kept: Accepted, counts: Mapping[str, int], groups: Mapping[str, NDArray[np.int64]], path_m: float, seed: int,
-    preference: float,
-) -> Floats:  # fmt: skip
-    """Gumbel scores (n,), tilted so that selected lengths sum to `path_m`."""
-    length_m = kept.length_m
+    settings, length_m = np.asarray(kept.settings)[by_key], kept.length_m
+    groups = {name: by_key[settings == name] for name in sorted(counts)}
     gumbel_scores = np.array([_gumbel(seed, key) for key in kept.sampling_keys]) + preference * kept.levels
 
-    def tilted(tilt: float) -> Floats:
-        return np.asarray(gumbel_scores + tilt * length_m / _SCALE_M)
+    def ranked(tilt: float) -> dict[str, NDArray[np.int64]]:
+        scores = gumbel_scores + tilt * length_m / _SCALE_M
+        return {name: rows[np.argsort(-scores[rows], kind="stable")] for name, rows in groups.items()}
 
-    def total(scores: Floats) -> float:
-        return float(sum(length_m[_best(scores, rows)[: counts[name]]].sum() for name, rows in groups.items()))
+    def total(order: Mapping[str, NDArray[np.int64]]) -> float:
+        return float(sum(length_m[rows[: counts[name]]].sum() for name, rows in order.items()))
 
     low, high = -_STEEPEST, _STEEPEST
-    best = tilted(0.0)
+    best = ranked(0.0)
     nearest = abs(total(best) - path_m)
     for _ in range(_HALVINGS):
         middle = (low + high) / 2
-        scores = tilted(middle)
-        reached = total(scores)
+        order = ranked(middle)
+        reached = total(order)
         if abs(reached - path_m) < nearest:
-            best, nearest = scores, abs(reached - path_m)
+            best, nearest = order, abs(reached - path_m)
         if reached < path_m:
             low = middle
         else:
