@@ -20,8 +20,7 @@ from aerialdojo_gen.pipeline.interrupt import Interrupts
 from aerialdojo_gen.pipeline.options import RunLimits, RunOptions
 from aerialdojo_gen.pipeline.progress import Reporter, duration
 from aerialdojo_gen.pipeline.registry import BY_NAME, STAGES, upstream
-from aerialdojo_gen.pipeline.runtime_estimate import RuntimeEstimate
-from aerialdojo_gen.pipeline.scheduler import SceneScheduler
+from aerialdojo_gen.pipeline.scheduler import RuntimeEstimate, SceneScheduler
 from aerialdojo_gen.pipeline.stage import ProjectPaths, Stage
 from aerialdojo_gen.pipeline.task import Computed, StageSummary, compute
 from aerialdojo_gen.store import shards as store
@@ -59,7 +58,7 @@ def run(
             roots.data.refresh()
             limits = options.limits if options.limits and group[-1] is stages[-1] else RunLimits()
             finder = ShardFinder(pipeline, roots, scenes, reporter, options.force, limits)
-            scheduler = SceneScheduler(group, scenes, finder, roots.data, reporter, estimate)
+            scheduler = SceneScheduler(group, finder, estimate)
             busy = [stage.name for stage in group if any(estimate.left(stage.name, scene) for scene in scenes)]
             if scheduler and (cold := uncompiled(busy)):
                 reporter.line(f"compiling {', '.join(cold)} to machine code, once: up to two minutes of CPU time")

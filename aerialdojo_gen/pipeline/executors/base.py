@@ -171,13 +171,6 @@ class TaskQueue(Generic[T]):
         self._at[lane] = scene
         return self._pop(scene)
 
-    def one_by_one(self) -> Iterator[T]:
-        """Yield all tasks for a single process, scene by scene."""
-        scene = ""
-        while self._scenes:
-            scene = scene if scene in self._scenes else next(iter(self._scenes))
-            yield self._pop(scene)
-
     def on_done(self, task: T, outcome: Any) -> None:
         """Record a task's result or expected error."""
 

@@ -84,7 +84,7 @@ class LocalExecutor(Executor):
         """Run tasks and yield results or expected errors in completion order."""
         channel = waiting.channel
         if self._workers <= 1 or waiting.alone:
-            for task in waiting.one_by_one():
+            while (task := waiting.take(0)) is not None:
                 outcome = guarded(work, task, channel)
                 waiting.on_done(task, outcome)
                 yield outcome
