@@ -64,16 +64,6 @@ def test_parts_that_no_picture_shows_are_not_said(smoke, claims):
     assert parts > 0
 
 
-def test_a_scene_is_described_alike_each_time(smoke, claims):
-    def described():
-        writer = Writer(claims, ["a"], 3, "describe")
-        for item in rows_of(smoke, "objects"):
-            own = [Claim.from_json(raw) for raw in json.loads(item["claims"])]
-            yield writer.texts(claims.geometry.index[item["mesh_node"]], own, None, 5)
-
-    assert list(described()) == list(described())
-
-
 def test_tasks_have_a_text_of_their_target_and_side(smoke):
     texts = {row["object_id"]: row["paraphrases"] for row in rows_of(smoke, "release/objects")}
     for subset in ("train", "test"):
