@@ -210,7 +210,7 @@ def _finish_release(
     from aerialdojo_gen.dataset.contents import CARD, CROISSANT, existing_files, prune_release
     from aerialdojo_gen.dataset.protocol import SAMPLE, write_sample
     from aerialdojo_gen.dataset.provenance import RECORD, record_makers
-    from aerialdojo_gen.store.memo import cache_text, is_cached, memo_key
+    from aerialdojo_gen.store.cache import cache_text, is_cached, memo_key
 
     if whole:
         # The whole pipeline was asked for: the release holds its scenes and no others.

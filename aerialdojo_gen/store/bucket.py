@@ -1,8 +1,8 @@
 """Requests to an S3 bucket: get, put, list, delete and conditional puts, tried again where that helps.
 
 Credentials, region, endpoint, retries and checksums are configured as for every AWS tool: by environment variables
-and by the files that `aws configure` writes, never by the URL. What asking again cannot mend becomes one line, in
-`aerialdojo_gen.store.cloud_errors`.
+and by the files that `aws configure` writes, never by the URL. What asking again cannot mend becomes one line that
+names the URL and the mend.
 """
 
 from __future__ import annotations
@@ -20,8 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from aerialdojo_gen.base.environment_errors import number_of
-from aerialdojo_gen.base.errors import MissingPackage, StoreError, no_package
-from aerialdojo_gen.store.cloud_errors import Changed, cloud_error, code_of, is_transient
+from aerialdojo_gen.base.errors import MissingPackage, StoreError, first_line, no_package
 
 # A file of more bytes goes up in parts, several at a time; S3 takes 10,000 of them at most.
 _SINGLE, _PART, _MAX_PARTS, AT_ONCE = 16 << 20, 8 << 20, 9_000, 4
@@ -31,6 +30,82 @@ _TRIES = 6
 # well below the time that a lock holds.
 _SILENT_S = 15.0
 Write = Callable[[bytes], object]
+
+_KEPT = "what was finished is kept, nothing half-written"
+_CREDENTIALS = (
+    "set AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY (and AWS_SESSION_TOKEN where they are temporary), "
+    "or AWS_PROFILE, or run aws configure"
+)
+_MISSING = {"NoSuchKey", "404", "NotFound"}
+_CHANGED = {"PreconditionFailed", "412", "ConditionalRequestConflict", "409"}
+_BUSY = {
+    "SlowDown", "503", "ServiceUnavailable", "InternalError", "500", "502", "504", "RequestTimeout", "Throttling",
+    "ThrottlingException", "RequestLimitExceeded", "BandwidthLimitExceeded", "OperationAborted",
+}  # fmt: skip
+_UNREACHABLE = {
+    "EndpointConnectionError", "ConnectTimeoutError", "ReadTimeoutError", "ConnectionClosedError", "SSLError",
+    "ProxyConnectionError", "HTTPClientError", "ConnectionError", "ResponseStreamingError", "IncompleteReadError",
+}  # fmt: skip
+# Names of the client's errors or codes that stores answer with, and what each means.
+_EXPLAINED = (
+    ({"NoCredentialsError", "PartialCredentialsError", "CredentialRetrievalError", "NoAuthTokenError"},
+     f"there are no credentials: {_CREDENTIALS}"),
+    ({"TokenRetrievalError", "SSOTokenLoadError", "UnauthorizedSSOTokenError"},
+     "the session has expired: run aws sso login, or set other credentials"),
+    ({"ProfileNotFound"},
+     "there is no AWS profile of the name that AWS_PROFILE says: correct it, or run aws configure"),
+    ({"InvalidAccessKeyId", "SignatureDoesNotMatch", "ExpiredToken", "InvalidToken", "TokenRefreshRequired"},
+     f"the store refuses the credentials ({{code}}): {_CREDENTIALS}"),
+    ({"NoSuchBucket"}, "there is no bucket {bucket!r} at {endpoint}: make it, or correct --data"),
+    ({"AccessDenied", "403", "Forbidden", "AllAccessDisabled", "AccountProblem"},
+     "access is denied: the credentials need s3:ListBucket, s3:GetObject, s3:PutObject, s3:DeleteObject and "
+     "s3:AbortMultipartUpload there"),
+    ({"PermanentRedirect", "301", "AuthorizationHeaderMalformed", "IllegalLocationConstraintException"},
+     "the bucket is of another region: set AWS_DEFAULT_REGION to it"),
+    (_BUSY, f"the store keeps answering {{code}}: run the command again later; {_KEPT}"),
+    (_UNREACHABLE,
+     "{endpoint} cannot be reached, does not answer or drops the connection: check the network and "
+     f"AWS_ENDPOINT_URL, and run the command again; {_KEPT}"),
+)  # fmt: skip
+
+
+class Changed(Exception):  # noqa: N818 - it says what happened
+    """An object is no longer, or not yet, the one that a request was for."""
+
+
+def code_of(error: BaseException) -> str:
+    """Return the code that the store answered with; empty where it did not answer."""
+    response: Any = getattr(error, "response", None)
+    return str(response.get("Error", {}).get("Code", "")) if isinstance(response, dict) else ""
+
+
+def is_transient(error: BaseException) -> bool:
+    """Whether to ask again may help."""
+    return bool(_kinds(error) & (_BUSY | _UNREACHABLE)) or isinstance(error, OSError)
+
+
+def _kinds(error: BaseException) -> set[str]:
+    return {code_of(error), *(kind.__name__ for kind in type(error).__mro__)}
+
+
+def cloud_error(error: Exception, url: str, endpoint: str | None) -> Exception | None:
+    """Return what to raise for an error of the client; None where it is a defect of ours."""
+    code, kinds = code_of(error), _kinds(error)
+    if code in _MISSING:
+        return FileNotFoundError(2, "no such object", url)
+    if code in _CHANGED:
+        return Changed(url)
+    for known, why in _EXPLAINED:
+        if kinds & known:
+            bucket = url.removeprefix("s3://").partition("/")[0]
+            return StoreError(f"{url}: {why.format(code=code, bucket=bucket, endpoint=endpoint)}")
+    if code:
+        return StoreError(f"{url}: the store refuses ({first_line(error)}); {_KEPT}")
+    if kinds & {"BotoCoreError", "ValueError"}:
+        return StoreError(f"{url}: {first_line(error)}: correct the AWS configuration or --data")
+    if isinstance(error, OSError):
+        return StoreError(f"{url}: {error.strerror or first_line(error)}; {_KEPT}")
+    return None
 
 
 @dataclass(frozen=True)

@@ -25,8 +25,7 @@ from typing import NamedTuple
 from aerialdojo_gen.base.environment_errors import number_of
 from aerialdojo_gen.base.errors import Malformed, StoreError
 from aerialdojo_gen.base.safe_parse import loads_json
-from aerialdojo_gen.store.bucket import Bucket
-from aerialdojo_gen.store.cloud_errors import Changed
+from aerialdojo_gen.store.bucket import Bucket, Changed
 
 _DEFAULT_S = 60.0
 _RENEWALS = 4

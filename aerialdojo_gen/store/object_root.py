@@ -31,8 +31,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any, BinaryIO, TypeVar
 
 from aerialdojo_gen.base.errors import StoreError
-from aerialdojo_gen.store.bucket import Bucket, Entry
-from aerialdojo_gen.store.cloud_errors import Changed
+from aerialdojo_gen.store.bucket import Bucket, Changed, Entry
 from aerialdojo_gen.store.lease import Lease, lease_lost, lease_s, token_of
 from aerialdojo_gen.store.object_folders import (
     MANIFEST,

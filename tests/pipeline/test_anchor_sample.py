@@ -21,8 +21,8 @@ from aerialdojo_gen.geometry.surface import Surface
 from aerialdojo_gen.geometry.viewpoints import shortlist
 from aerialdojo_gen.pipeline.stages.work import anchor_sample
 from aerialdojo_gen.pipeline.stages.work.anchor_choice import is_same
+from aerialdojo_gen.pipeline.stages.work.anchor_pictures import fitting_m
 from aerialdojo_gen.pipeline.stages.work.anchor_sample import World, anchors_of
-from aerialdojo_gen.pipeline.stages.work.camera_pullback import fitting_m
 from aerialdojo_gen.scenes.anatomy import Anatomy, Run
 from aerialdojo_gen.scenes.model import Instance
 from aerialdojo_gen.store import schemas

@@ -42,7 +42,7 @@ STALE = {
     "pipeline/runner.py": set(),
     "pipeline/registry.py": set(),
     "pipeline/stages/work/filter.py": {"filter"},
-    "pipeline/stages/work/quota.py": {"plan", "split"},
+    "pipeline/stages/work/candidate_policy.py": {"plan", "split"},
     "pipeline/scoring/geometric.py": {"anchor-sample"},
     "annotations/relations.py": {"annotate-import", "describe"},
     "annotations/language/grammar.toml": {"describe"},

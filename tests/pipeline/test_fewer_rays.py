@@ -17,10 +17,9 @@ from aerialdojo_gen.geometry.rays import instance_caster
 from aerialdojo_gen.geometry.viewpoints import shortlist
 from aerialdojo_gen.pipeline.scoring.ensemble import scorer_ensemble
 from aerialdojo_gen.pipeline.scoring.views import part_shares
-from aerialdojo_gen.pipeline.stages.work.anchor_pictures import CandidateViews, best_pictured
+from aerialdojo_gen.pipeline.stages.work.anchor_pictures import CandidateViews, best_pictured, fitting_m, steps_back_m
 from aerialdojo_gen.pipeline.stages.work.anchor_sample import candidates_of
 from aerialdojo_gen.pipeline.stages.work.anchor_world import Candidates
-from aerialdojo_gen.pipeline.stages.work.camera_pullback import fitting_m, steps_back_m
 from aerialdojo_gen.pipeline.stages.work.reference_images import MIN_SHARE, instance_map, instance_mask
 from aerialdojo_gen.planning.collision import collision_world
 from aerialdojo_gen.rendering.backend import open_renderer

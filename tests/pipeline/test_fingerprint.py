@@ -8,7 +8,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from aerialdojo_gen.cli.common import open_pipeline
-from aerialdojo_gen.pipeline import fingerprint
+from aerialdojo_gen.pipeline import freshness
 from aerialdojo_gen.pipeline.registry import BY_NAME
 from aerialdojo_gen.store import shards as store
 
@@ -32,7 +32,7 @@ def opened(project, smoke, tmp_path_factory):
 
 
 def prints(opened):
-    return {name: fingerprint.scene_fingerprint(stage, *opened, SCENE) for name, stage in BY_NAME.items()}
+    return {name: freshness.scene_fingerprint(stage, *opened, SCENE) for name, stage in BY_NAME.items()}
 
 
 def changed(before, after):
@@ -79,9 +79,9 @@ def test_files_count_by_their_bytes_and_not_by_the_place_of_a_checkout(opened, p
 
 def test_the_papers_figures_count_where_they_are_read(opened, tmp_path, monkeypatch):
     before = prints(opened)
-    files = fingerprint.paper_figures.files()
+    files = freshness.paper_figures.files()
     copies = [shutil.copy(path, tmp_path / path.name) for path in files]
-    monkeypatch.setattr(fingerprint.paper_figures, "files", lambda: copies)
+    monkeypatch.setattr(freshness.paper_figures, "files", lambda: copies)
     assert prints(opened) == before, "a checkout elsewhere"
     copies[-1].write_bytes(copies[-1].read_bytes() + b"\n")
     assert changed(before, prints(opened)) == {"annotate-import", "plan", "split"}
@@ -93,8 +93,8 @@ def test_schemas_count_for_who_writes_and_who_reads_them(opened, monkeypatch, ta
     place = store.LAYOUT[table]
     other = dataclasses.replace(place, spec=dataclasses.replace(place.spec, plain=(*place.spec.plain, "scene")))
     monkeypatch.setitem(store.LAYOUT, table, other)
-    fingerprint._schemas.cache_clear()
+    freshness._schemas.cache_clear()
     after = prints(opened)
-    fingerprint._schemas.cache_clear()
+    freshness._schemas.cache_clear()
     touched = {name for name, stage in BY_NAME.items() if table in (*stage.reads, *stage.writes)}
     assert changed(before, after) == touched

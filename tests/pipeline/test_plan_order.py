@@ -7,8 +7,13 @@ from hypothesis import strategies as st
 
 from aerialdojo_gen.base.config.sections import FilterConfig, QuotaConfig
 from aerialdojo_gen.base.paper_figures import PaperScene
-from aerialdojo_gen.pipeline.stages.work.candidate_policy import Candidates, PaperQuota
-from aerialdojo_gen.pipeline.stages.work.quota import Accepted, difficulty_level, select_quota
+from aerialdojo_gen.pipeline.stages.work.candidate_policy import (
+    Accepted,
+    Candidates,
+    PaperQuota,
+    difficulty_level,
+    select_quota,
+)
 from aerialdojo_gen.pipeline.stages.work.rules import judge
 from aerialdojo_gen.planning.planner import Route
 

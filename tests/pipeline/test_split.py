@@ -12,8 +12,8 @@ from support.handmade import job_of
 from aerialdojo_gen.base.config.sections import FilterConfig, SplitConfig
 from aerialdojo_gen.pipeline.stages.work import filter as filter_stage
 from aerialdojo_gen.pipeline.stages.work import split
-from aerialdojo_gen.pipeline.stages.work.quota import train_counts, train_mask
-from aerialdojo_gen.pipeline.stages.work.task_ids import held_out, key_of, nav_id, reference_id
+from aerialdojo_gen.pipeline.stages.work.candidate_policy import train_counts, train_mask
+from aerialdojo_gen.pipeline.stages.work.split import held_out, key_of, nav_id, reference_id
 from aerialdojo_gen.store import shards as store
 
 SCENE, OTHER = "U_Courtyard_0", "U_Courtyard_1"

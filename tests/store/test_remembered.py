@@ -10,8 +10,8 @@ import pytest
 
 from aerialdojo_gen.base.errors import StoreError
 from aerialdojo_gen.cli.app import app
+from aerialdojo_gen.store.cache import cache_text, is_cached, memo, memo_key
 from aerialdojo_gen.store.files import file_digest
-from aerialdojo_gen.store.memo import cache_text, is_cached, memo, memo_key
 from aerialdojo_gen.store.root import open_root
 
 pytestmark = pytest.mark.usefixtures("cache")

@@ -21,8 +21,7 @@ from typing import Any
 
 from aerialdojo_gen.base import memory
 from aerialdojo_gen.base.errors import AerialDojoError
-from aerialdojo_gen.pipeline.executors.base import Executor, R, T, TaskQueue, guarded
-from aerialdojo_gen.pipeline.executors.channels import end
+from aerialdojo_gen.pipeline.executors.base import Executor, R, T, TaskQueue, end, guarded
 
 # How often the parent checks whether workers must stop, seconds.
 _POLL_S = 0.2

@@ -1,4 +1,7 @@
-"""Pictures for scoring candidates: from the candidate itself, and from the pulled-back reference camera."""
+"""Pictures for scoring candidates: from the candidate itself, and from the pulled-back reference camera.
+
+The camera of a reference picture steps back from the anchor until the object fits the picture.
+"""
 
 from __future__ import annotations
 
@@ -9,17 +12,103 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from aerialdojo_gen.base.kernels import njit
+from aerialdojo_gen.geometry.part_visibility import Patch, in_picture
+from aerialdojo_gen.geometry.portable import dot
 from aerialdojo_gen.geometry.viewpoints import level_marks, shortlist
 from aerialdojo_gen.pipeline.scoring.base import AnchorView
 from aerialdojo_gen.pipeline.scoring.ensemble import Verdict, scorer_ensemble
 from aerialdojo_gen.pipeline.scoring.geometric import clarity_score, most
-from aerialdojo_gen.pipeline.stages.work.anchor_world import Candidates
-from aerialdojo_gen.pipeline.stages.work.camera_pullback import part_limit_m, steps_back_m
+from aerialdojo_gen.pipeline.stages.work.anchor_world import Candidates, World
 
 Floats = NDArray[np.float64]
 
 # Least picture size for models.
 _MODEL_PX = 320
+# Of the half picture that the object may take: a little room around it.
+_FILLED = 0.94
+# The camera's own room, and what it must keep to what it backs up to.
+_CAMERA_M, _KEPT_M = 0.15, 0.3
+# What comes between counts this much against what comes into the picture: a rail hides little, and spoils it.
+_HIDDEN = 2.0
+_TRIED = (1.0, 0.85, 0.7, 0.55, 0.4, 0.25)
+_MIN_STEP_M = 0.25
+# Share of the picture that an identifying part keeps if it had it, 12 x 12 pixels of 320 x 320, and the least of it.
+_PART_SHARE, _MIN_PART_SHARE = 0.0014, 0.0007
+
+
+def fitting_m(vertices: Floats, position_m: Floats, yaw_rad: float, fov_deg: float) -> float:
+    """How far, metres, a level camera must go back, 0 if not, for an object's vertices (n, 3) to fit its picture."""
+    half = _FILLED * math.tan(math.radians(fov_deg) / 2.0)
+    x, y, z = (float(c) for c in position_m)
+    return max(0.0, float(_fitting(vertices, x, y, z, math.cos(yaw_rad), math.sin(yaw_rad), half)))
+
+
+@njit(cache=True)
+def _fitting(vertices: Floats, x: float, y: float, z: float, cos: float, sin: float, half: float) -> float:
+    most = -np.inf
+    for n in range(len(vertices)):
+        u, v, w = vertices[n, 0] - x, vertices[n, 1] - y, vertices[n, 2] - z
+        most = max(most, max(abs(u * sin - v * cos), abs(w)) / half - (u * cos + v * sin))
+    return most
+
+
+def part_limit_m(patches: Sequence[Patch], seen: Floats, position_m: Floats, yaw_rad: float, fov_deg: float) -> float:
+    """How far, metres, a camera may go back before an identifying part gets too small; inf where none is seen."""
+    most = math.inf
+    ahead = np.array([math.cos(yaw_rad), math.sin(yaw_rad), 0.0])
+    for patch, share in zip(patches, seen.tolist(), strict=True):
+        away = max(float(dot(patch.points - position_m, ahead).mean()), 0.1)
+        taken = patch.area_m2 * share / (2.0 * away * math.tan(math.radians(fov_deg) / 2.0)) ** 2
+        if taken > 0.0:
+            floor = min(_PART_SHARE, max(_MIN_PART_SHARE, taken / 2.0))
+            most = min(most, max(0.0, away * (math.sqrt(taken / floor) - 1.0)))
+    return most
+
+
+def steps_back_m(
+    world: World, instance: int, points: Floats, positions_m: Floats, yaw_rad: Floats, fov_deg: float, most_m: Floats
+) -> Floats:
+    """How far, metres (n,), to pull the camera back: as far as the object needs and the way is free."""
+    steps = np.zeros(len(positions_m))
+    vertices = world.scene.instances[instance].vertices
+    fitting = [fitting_m(vertices, p, yaw, fov_deg) for p, yaw in zip(positions_m, yaw_rad.tolist(), strict=True)]
+    distance_m = np.minimum(fitting, most_m)
+    some = np.flatnonzero(distance_m >= _MIN_STEP_M)
+    if not len(some):
+        return steps
+    distance_m, places, yaws = distance_m[some], positions_m[some], yaw_rad[some]
+    back = -np.array([[math.cos(yaw), math.sin(yaw), 0.0] for yaw in yaws.tolist()])
+    free = world.rays.first_hit(places, back)[0] - _KEPT_M
+    low, high = world.scene.bounds
+    with np.errstate(divide="ignore", invalid="ignore"):
+        edges = np.where(back != 0.0, (np.where(back > 0, high, low) - places) / back, np.inf)
+    distance_m = np.minimum(np.minimum(distance_m, free), edges.min(axis=1) - _CAMERA_M)
+    far = distance_m >= _MIN_STEP_M
+    some, distance_m, places, yaws, back = some[far], distance_m[far], places[far], yaws[far], back[far]
+    best, chosen = np.full(len(some), -np.inf), np.zeros(len(some))
+    # From the farthest on, so that of equals the farthest is taken, which leaves room around it; the anchor's own
+    # place is tried last, and taken only where it is the better one.
+    for share in (*_TRIED, 0.0):
+        tried = np.floor(100.0 * share * distance_m) / 100.0
+        # What sees all of the points cannot be bettered, and casts no more rays.
+        left = np.flatnonzero(best < len(points))
+        if not len(left):
+            break
+        at = places[left] + tried[left, None] * back[left]
+        framed = in_picture(at, yaws[left], points, fov_deg)
+        keen = framed.sum(axis=1) > best[left]
+        if share:
+            keen[keen] = world.free.distance_m(at[keen]) > _CAMERA_M
+        left, at, framed = left[keen], at[keen], framed[keen]
+        who, what = np.nonzero(framed)
+        # What the object itself hides is hidden from every distance: its own surface counts wherever it is met.
+        seen = np.bincount(who, world.rays.visible(at[who], points[what], instance), minlength=len(left))
+        worth = seen - _HIDDEN * (framed.sum(axis=1) - seen)
+        better = worth > best[left]
+        best[left[better]], chosen[left[better]] = worth[better], tried[left[better]]
+    steps[some] = chosen
+    return steps
 
 
 @dataclass(frozen=True)
