@@ -14,7 +14,7 @@ from aerialdojo_gen.base.config.pipeline import Pipeline
 from aerialdojo_gen.base.errors import AerialDojoError, AssetError, BudgetSpent, UsageError
 from aerialdojo_gen.base.names import choose_scenes, unknown
 from aerialdojo_gen.pipeline.code_digest import stage_code
-from aerialdojo_gen.pipeline.executors import Executor, SharedPaths, make_executor, on_disk
+from aerialdojo_gen.pipeline.executors.base import Executor, SharedPaths, make_executor, on_disk
 from aerialdojo_gen.pipeline.freshness import ShardFinder
 from aerialdojo_gen.pipeline.interrupt import Interrupts
 from aerialdojo_gen.pipeline.options import RunLimits, RunOptions

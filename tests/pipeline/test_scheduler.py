@@ -10,7 +10,7 @@ from support.command_line import called
 
 from aerialdojo_gen.base.config.pipeline import load_pipeline
 from aerialdojo_gen.dataset.build import open_pipeline
-from aerialdojo_gen.pipeline.executors import make_executor
+from aerialdojo_gen.pipeline.executors.base import make_executor
 from aerialdojo_gen.pipeline.freshness import ShardFinder
 from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.pipeline.registry import BY_NAME, STAGES

@@ -38,17 +38,21 @@ def part_score(part_visibility: Floats) -> Floats:
 
 def front_score(off_front_rad: ArrayLike | None) -> Floats | None:
     """Mark angles off the front: full up to 25°, half at 60°, little beyond; None for an object without a front."""
-    return None if off_front_rad is None else np.asarray(np.interp(off_front_rad, _ANGLES_RAD, _MARKS))
+    return None if off_front_rad is None else _interpolate(off_front_rad, _ANGLES_RAD, _MARKS)
 
 
 def clarity_score(unoccluded: ArrayLike, framed: ArrayLike, foreground: ArrayLike, level: ArrayLike) -> Floats:
     """Factor in (0, 1] for what hides the object, cuts it off or stands nearer, and for looking up or down."""
     return np.asarray(
-        np.interp(unoccluded, (0.4, 0.95), (0.4, 1.0))
-        * np.interp(framed, (0.5, 0.98), (0.6, 1.0))
-        * np.interp(foreground, (0.05, 0.5), (1.0, 0.5))
-        * np.interp(level, (0.0, 1.0), (0.7, 1.0))
+        _interpolate(unoccluded, (0.4, 0.95), (0.4, 1.0))
+        * _interpolate(framed, (0.5, 0.98), (0.6, 1.0))
+        * _interpolate(foreground, (0.05, 0.5), (1.0, 0.5))
+        * _interpolate(level, (0.0, 1.0), (0.7, 1.0))
     )
+
+
+def _interpolate(value: ArrayLike, at: ArrayLike, marks: ArrayLike) -> Floats:
+    return np.asarray(np.interp(np.asarray(value), np.asarray(at), np.asarray(marks)))
 
 
 def recognisability(score: ArrayLike, parts: ArrayLike | None, front: ArrayLike | None) -> Floats:
@@ -93,32 +97,34 @@ def judge(view: AnchorView, radius_m: float, standoff_m: float) -> Parts:
     marks = view.marks
     if view.behind is not None:
         marks = {name: _mixed(term, view.behind.marks[name]) for name, term in marks.items()}
-    return _parts(view.known, marks, radius_m, standoff_m)
+    return _parts(view.measures, marks, radius_m, standoff_m)
 
 
-def most(known: CandidateMeasures, radius_m: float, standoff_m: float, behind: AnchorView | None = None) -> float:
+def score_bound(
+    measures: CandidateMeasures, radius_m: float, standoff_m: float, behind: AnchorView | None = None
+) -> float:
     """Bound the score of every picture from a viewpoint from above, by what is known of the viewpoint without one."""
     marks = dict.fromkeys(("unoccluded", "size", "centred", "contrast", "sky", "open"), 1.0)
-    marks["framed"] = known.framed
+    marks["framed"] = measures.framed
     if behind is not None:
         marks = {name: _mixed(term, behind.marks[name]) for name, term in marks.items()}
-    elif known.framed_behind is not None:
-        marks["framed"] = _mixed(known.framed, known.framed_behind)
-    return _parts(known, marks, radius_m, standoff_m).score + _ROUNDING
+    elif measures.framed_behind is not None:
+        marks["framed"] = _mixed(measures.framed, measures.framed_behind)
+    return _parts(measures, marks, radius_m, standoff_m).score + _ROUNDING
 
 
 def _mixed(here: float, behind: float) -> float:
     return (1.0 - _BEHIND) * here + _BEHIND * behind
 
 
-def _parts(known: CandidateMeasures, marks: dict[str, Any], radius_m: float, standoff_m: float) -> Parts:
+def _parts(measures: CandidateMeasures, marks: dict[str, Any], radius_m: float, standoff_m: float) -> Parts:
     room = standoff_m - radius_m
-    clear = min(max((known.clearance_m - radius_m) / room, 0.0), 1.0) if room > 0.0 else 1.0
-    tells = float(part_score(np.array(known.part_visibility))) if known.part_visibility else None
-    off = front_score(known.off_front_rad)
-    level = float(level_marks(known.elevation_deg))
+    clear = min(max((measures.clearance_m - radius_m) / room, 0.0), 1.0) if room > 0.0 else 1.0
+    tells = float(part_score(np.array(measures.part_visibility))) if measures.part_visibility else None
+    off = front_score(measures.off_front_rad)
+    level = float(level_marks(measures.elevation_deg))
     front = None if off is None else float(off)
-    return Parts(shown=known.shown, level=level, clear=clear, tells=tells, front=front, **marks)
+    return Parts(shown=measures.shown, level=level, clear=clear, tells=tells, front=front, **marks)
 
 
 class GeometricScorer:

@@ -36,7 +36,7 @@ def take_view(
     camera: Camera,
     position_m: Floats,
     yaw_rad: float,
-    known: CandidateMeasures,
+    measures: CandidateMeasures,
     parts: Sequence[NDArray[np.int64]],
 ) -> AnchorView:
     """Take an object's front view from a candidate anchor (world metres, radians), the same mask anywhere."""
@@ -51,12 +51,13 @@ def take_view(
     silhouette.flat[hidden] = alone.first_hit(position_m, directions)[1] >= 0
     shares = part_shares(alone, thing, parts, camera, pose, visible)
     marks = tuple(
-        seen * min(1.0, math.sqrt(share / _LARGE)) for seen, share in zip(known.part_visibility, shares, strict=True)
+        seen * min(1.0, math.sqrt(share / _LARGE))
+        for seen, share in zip(measures.part_visibility, shares, strict=True)
     )
     wide = (picture.instance >= 0) & renderer.wide[picture.instance]
     nearer = standing_nearer(picture.depth_m, visible, wide, camera, pose)
-    known = replace(known, part_visibility=marks)
-    return AnchorView(picture.rgb, visible, silhouette, picture.instance < 0, known, nearer)
+    measures = replace(measures, part_visibility=marks)
+    return AnchorView(picture.rgb, visible, silhouette, picture.instance < 0, measures, nearer)
 
 
 def standing_nearer(

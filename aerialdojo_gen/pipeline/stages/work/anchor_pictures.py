@@ -18,7 +18,7 @@ from aerialdojo_gen.geometry.portable import dot
 from aerialdojo_gen.geometry.viewpoints import level_marks, shortlist
 from aerialdojo_gen.pipeline.scoring.base import AnchorView
 from aerialdojo_gen.pipeline.scoring.ensemble import Verdict, scorer_ensemble
-from aerialdojo_gen.pipeline.scoring.geometric import clarity_score, most
+from aerialdojo_gen.pipeline.scoring.geometric import clarity_score, score_bound
 from aerialdojo_gen.pipeline.stages.work.anchor_world import Candidates, World
 
 Floats = NDArray[np.float64]
@@ -146,27 +146,27 @@ class CandidateViews:
         view = self.found.picture(int(self.which[n]), size_px)
         if self.has_back(n):
             back = back or self.behind.picture(n, size_px)
-            known = replace(
-                view.known, shown=(view.known.shown + back.known.shown) / 2.0,
-                part_visibility=_mean(view.known.part_visibility, back.known.part_visibility),
+            measures = replace(
+                view.measures, shown=(view.measures.shown + back.measures.shown) / 2.0,
+                part_visibility=_mean(view.measures.part_visibility, back.measures.part_visibility),
             )  # fmt: skip
-            view = replace(view, known=known, behind=back)
+            view = replace(view, measures=measures, behind=back)
         return view
 
     def has_back(self, n: int) -> bool:
         """Whether the reference picture of a candidate, a number among `which`, is taken from behind it."""
         return bool(self.step_back_m[n] > 0.0)
 
-    def most(self, n: int, back: AnchorView | None = None) -> float:
+    def score_bound(self, n: int, back: AnchorView | None = None) -> float:
         """Bound the geometric score of number n of `which` from above without its picture; one from behind helps."""
-        known, behind = self.found.measures(int(self.which[n])), self.behind
+        measures, behind = self.found.measures(int(self.which[n])), self.behind
         if self.has_back(n):
-            seen = behind.part_visibility[n].tolist() if back is None else back.known.part_visibility
-            known = replace(
-                known, shown=(known.shown + float(behind.views.shown[n])) / 2.0,
-                part_visibility=_mean(known.part_visibility, seen), framed_behind=float(behind.views.framed[n]),
+            seen = behind.part_visibility[n].tolist() if back is None else back.measures.part_visibility
+            measures = replace(
+                measures, shown=(measures.shown + float(behind.views.shown[n])) / 2.0,
+                part_visibility=_mean(measures.part_visibility, seen), framed_behind=float(behind.views.framed[n]),
             )  # fmt: skip
-        return most(known, self.found.radius_m, self.found.config.standoff_m, back)
+        return score_bound(measures, self.found.radius_m, self.found.config.standoff_m, back)
 
 
 def best_pictured(
@@ -188,7 +188,7 @@ def best_pictured(
         score = np.array([verdict.score for _, verdict in found.values()])
     else:
         found = {}
-        score = np.array([candidate_views.most(n) for n in few.tolist()])
+        score = np.array([candidate_views.score_bound(n) for n in few.tolist()])
     backs: dict[int, AnchorView] = {}
     while True:
         # A shortlist of exact scores only is final: bounds are never below scores.
@@ -201,7 +201,7 @@ def best_pictured(
         which = int(few[n])
         if candidate_views.has_back(which) and n not in backs:
             backs[n] = candidate_views.behind.picture(which, config.picture_px)
-            score[n] = candidate_views.most(which, backs[n])
+            score[n] = candidate_views.score_bound(which, backs[n])
             continue
         view = candidate_views.picture(which, config.picture_px, backs.get(n))
         found[n] = view, scorers.judge(name, [view])[0]
