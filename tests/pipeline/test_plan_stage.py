@@ -8,13 +8,12 @@ import pyarrow.compute as pc
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from support.flying import along, distances, solid, town
+from support.flying import town
 from support.handmade import job_of, write_rows, write_scene, xyz
 
 from aerialdojo_gen.base.config.sections import FilterConfig, PairObjectsConfig, PlanConfig, QuotaConfig
 from aerialdojo_gen.base.errors import StoreError
 from aerialdojo_gen.base.paper_figures import PaperScene
-from aerialdojo_gen.geometry.motion import replay
 from aerialdojo_gen.pipeline.stages.work import candidate_policy, pair_objects, plan
 from aerialdojo_gen.pipeline.stages.work.candidate_policy import (
     Accepted,
@@ -88,33 +87,6 @@ def test_the_anchor_inside_a_house_starts_nothing(shards):
         if inside:
             assert (r["length_m"], r["n_actions"], r["x_m"], r["action"]) == (0.0, 0, [], [])
             assert r["min_clearance_m"] is None
-
-
-def test_stored_routes_run_from_the_turned_start_anchor_to_the_selected_one(data, shards):
-    anchors = {(a["object_id"], a["anchor_id"]): a for a in store.read_scene(data, "anchors", SCENE).to_pylist()}
-    pairs = {p["pair_id"]: p for p in store.read_scene(data, "pairs", SCENE).to_pylist()}
-    mesh = solid(town())
-    checked = 0
-    for out in shards:
-        solved = out.tables["plans"].filter(pc.equal(out.tables["plans"]["outcome"], "SOLVED"))
-        for r in solved.to_pylist():
-            pair = pairs[r["pair_id"]]
-            begin = anchors[pair["start_object_id"], pair["start_anchor_id"]]
-            end = anchors[pair["target_object_id"], 1]
-            p = np.column_stack([r["x_m"], r["y_m"], r["z_m"]])
-            assert p[0] == pytest.approx([begin["x_m"], begin["y_m"], begin["z_m"]], abs=1e-12)
-            assert p[-1].tolist() == [end["x_m"], end["y_m"], end["z_m"]]
-            assert math.cos(r["yaw_rad"][0] - begin["yaw_rad"]) == pytest.approx(-1.0)
-            assert math.cos(r["yaw_rad"][-1] - end["yaw_rad"]) >= math.cos(math.radians(7.5)) - 1e-9
-            assert r["n_actions"] == len(r["action"]) == len(p)
-            flown = [a for a in r["action"] if a not in (schemas.STOP, schemas.APPROACH)]
-            replayed = replay([*p[0], r["yaw_rad"][0]], flown)
-            assert np.abs(replayed[:, :3] - p[: len(replayed)]).max() < 1e-5
-            assert r["length_m"] == pytest.approx(np.linalg.norm(np.diff(p, axis=0), axis=1).sum(), abs=1e-9)
-            if checked % 6 == 0:
-                assert distances(mesh, along(p, 0.1)).min() >= 0.25 - 1e-9
-            checked += 1
-    assert checked > 40
 
 
 def test_a_shard_does_not_depend_on_what_was_planned_before(data, shards):
