@@ -1,4 +1,4 @@
-"""The release of the smoke scenes: shares, rules and ids; that its rows agree, `validate` finds (test_validate_release)."""
+"""The release of the smoke scenes: shares, rules and ids; that its rows agree, `validate` finds (tests/dataset)."""
 
 import re
 
