@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable
 from contextlib import AbstractContextManager, closing
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, TextIO
 
 from tqdm import tqdm
@@ -25,6 +26,7 @@ _PLAIN_EVERY_S, _SILENT_S = 10.0, 30.0
 _NAMED = 3
 # Width of the bar of a whole run, columns.
 _BAR = 6
+_fill = partial(textwrap.fill, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
 _WITHOUT_SPEED = "{l_bar}{bar}| {n_fmt}/{total_fmt} [{elapsed}{postfix}]"
 
 
@@ -205,11 +207,7 @@ class Reporter:
         """Write a line, above a bar if there is one."""
         if not self._quiet:
             text = shown(text)
-            if self._stream.isatty():
-                wrapper = textwrap.TextWrapper(columns(self._stream), subsequent_indent="  ")
-                wrapper.break_long_words = wrapper.break_on_hyphens = False
-                text = wrapper.fill(text)
-            tqdm.write(text, file=self._stream)
+            tqdm.write(_fill(text, columns(self._stream)) if self._stream.isatty() else text, file=self._stream)
             self._stream.flush()
 
     def bar(self, label: str, total: int, unit: str = "shards") -> AbstractContextManager[Bar]:
