@@ -111,7 +111,8 @@ def test_candidates_that_are_moved_are_what_they_are_where_they_are_moved_to(fou
     moved = found.moved(which, places)
     anew = Candidates(found.world, found.instance, found.points, places, found.yaw_rad[which], RADIUS, CONFIG)
     for name in (
-        "positions_m", "yaw_rad", "elevation_deg", "clearance_m", "seen", "part_visibility", "off_front_rad", "rank",
+        "positions_m", "yaw_rad", "elevation_deg", "clearance_m", "part_shares", "part_visibility", "off_front_rad",
+        "rank",
     ):  # fmt: skip
         np.testing.assert_array_equal(getattr(moved, name), getattr(anew, name), err_msg=name)
     for name in ("visible_fraction", "framed", "shown", "box_fraction", "off_centre"):

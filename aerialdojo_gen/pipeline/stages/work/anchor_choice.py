@@ -57,18 +57,18 @@ def judge_anchor(
         faults.append(f"it is too {side}: {distance:.2f} m from the object's surface, not about "
                       f"{config.standoff_m:g} m")  # fmt: skip
     points = surface.sample(config.surface_points, generator(job.seed, "anchor-sample", job.scene, item["object_id"]))
-    found = Candidates(world, k, points, place, np.array([yaw_rad]), radius, config)
-    seen = float(found.views.visible_fraction[0])
-    if seen <= 0 or seen < config.min_visible_fraction:
-        faults.append(f"it does not see the object: {seen:.0%} of what it faces, {config.min_visible_fraction:.0%} "
+    candidates = Candidates(world, k, points, place, np.array([yaw_rad]), radius, config)
+    share = float(candidates.views.visible_fraction[0])
+    if share <= 0 or share < config.min_visible_fraction:
+        faults.append(f"it does not see the object: {share:.0%} of what it faces, {config.min_visible_fraction:.0%} "
                       "is the least")  # fmt: skip
-    candidate_views = CandidateViews.of(found, np.zeros(1, np.int64))
+    candidate_views = CandidateViews.of(candidates, np.zeros(1, np.int64))
     picture = candidate_views.picture(0, config.picture_px)
     parts = judge(picture, radius, config.standoff_m)
     row = {
         "scene": job.scene,
         "object_id": item["object_id"],
-        **found.row(0, distance),
+        **candidates.row(0, distance),
         "no_front_reason": None,
         "step_back_m": float(candidate_views.step_back_m[0]),
         # The other scorers compare candidates; there is only one here.

@@ -97,16 +97,16 @@ def steps_back_m(
             break
         at = places[left] + tried[left, None] * back[left]
         framed = in_picture(at, yaws[left], points, fov_deg)
-        keen = framed.sum(axis=1) > best[left]
+        promising = framed.sum(axis=1) > best[left]
         if share:
-            keen[keen] = world.free.distance_m(at[keen]) > _CAMERA_M
-        left, at, framed = left[keen], at[keen], framed[keen]
-        who, what = np.nonzero(framed)
+            promising[promising] = world.free.distance_m(at[promising]) > _CAMERA_M
+        left, at, framed = left[promising], at[promising], framed[promising]
+        viewpoint, point = np.nonzero(framed)
         # What the object itself hides is hidden from every distance: its own surface counts wherever it is met.
-        seen = np.bincount(who, world.rays.visible(at[who], points[what], instance), minlength=len(left))
-        worth = seen - _HIDDEN * (framed.sum(axis=1) - seen)
-        better = worth > best[left]
-        best[left[better]], chosen[left[better]] = worth[better], tried[left[better]]
+        seen = np.bincount(viewpoint, world.rays.visible(at[viewpoint], points[point], instance), minlength=len(left))
+        value = seen - _HIDDEN * (framed.sum(axis=1) - seen)
+        better = value > best[left]
+        best[left[better]], chosen[left[better]] = value[better], tried[left[better]]
     steps[some] = chosen
     return steps
 
@@ -115,35 +115,36 @@ def steps_back_m(
 class CandidateViews:
     """Candidates of an object, each with the pulled-back camera of its reference picture."""
 
-    found: Candidates  # All of the object
-    which: NDArray[np.int64]  # (k,) int64; rows of `found`
+    candidates: Candidates  # All of the object
+    which: NDArray[np.int64]  # (k,) int64; rows of `candidates`
     step_back_m: Floats  # (k,) float64; camera pullback, metres
     behind: Candidates  # The pulled-back positions
     rank: Floats  # (k,) float64; ray-cast score of both positions
 
     @classmethod
-    def of(cls, found: Candidates, which: NDArray[np.int64]) -> CandidateViews:
+    def of(cls, candidates: Candidates, which: NDArray[np.int64]) -> CandidateViews:
         """Look from behind the candidates `which` (k,)."""
-        config, places, yaws = found.config, found.positions_m[which], found.yaw_rad[which]
+        config, places, yaws = candidates.config, candidates.positions_m[which], candidates.yaw_rad[which]
         limits_m = [
-            part_limit_m(found.patches, found.seen[k], places[n], float(yaws[n]), config.fov_deg)
+            part_limit_m(candidates.patches, candidates.part_shares[k], places[n], float(yaws[n]), config.fov_deg)
             for n, k in enumerate(which)
         ]
-        most = np.minimum(config.step_back_m, limits_m)
-        backs = steps_back_m(found.world, found.instance, found.points, places, yaws, config.fov_deg, most)
+        most_m = np.minimum(config.step_back_m, limits_m)
+        world, instance, points = candidates.world, candidates.instance, candidates.points
+        backs = steps_back_m(world, instance, points, places, yaws, config.fov_deg, most_m)
         away = np.column_stack([np.cos(yaws), np.sin(yaws), np.zeros(len(yaws))]) * backs[:, None]
-        behind = found.moved(which, places - away)
-        views, elevation = behind.views, found.elevation_deg[which]
+        behind = candidates.moved(which, places - away)
+        views, elevation = behind.views, candidates.elevation_deg[which]
         clear = clarity_score(views.visible_fraction, views.framed, np.zeros(len(which)), level_marks(elevation))
-        rank = (found.rank[which] + behind.rank) / 2.0 * clear
-        return cls(found, which, backs, behind, rank)
+        rank = (candidates.rank[which] + behind.rank) / 2.0 * clear
+        return cls(candidates, which, backs, behind, rank)
 
     def picture(self, n: int, size_px: int, back: AnchorView | None = None) -> AnchorView:
         """Picture a candidate, a number among `which`; the view from behind, if any, may be there already.
 
         What is shown is the mean of both.
         """
-        view = self.found.picture(int(self.which[n]), size_px)
+        view = self.candidates.picture(int(self.which[n]), size_px)
         if self.has_back(n):
             back = back or self.behind.picture(n, size_px)
             measures = replace(
@@ -159,53 +160,51 @@ class CandidateViews:
 
     def score_bound(self, n: int, back: AnchorView | None = None) -> float:
         """Bound the geometric score of number n of `which` from above without its picture; one from behind helps."""
-        measures, behind = self.found.measures(int(self.which[n])), self.behind
+        measures, behind = self.candidates.measures(int(self.which[n])), self.behind
         if self.has_back(n):
             seen = behind.part_visibility[n].tolist() if back is None else back.measures.part_visibility
             measures = replace(
                 measures, shown=(measures.shown + float(behind.views.shown[n])) / 2.0,
                 part_visibility=_mean(measures.part_visibility, seen), framed_behind=float(behind.views.framed[n]),
             )  # fmt: skip
-        return score_bound(measures, self.found.radius_m, self.found.config.standoff_m, back)
+        return score_bound(measures, self.candidates.radius_m, self.candidates.config.standoff_m, back)
 
 
 def best_pictured(
     name: str,
     candidate_views: CandidateViews,
-    few: NDArray[np.int64],
+    indices: NDArray[np.int64],
     azimuth_rad: Floats,
     front: NDArray[np.bool_],
 ) -> tuple[NDArray[np.int64], list[tuple[AnchorView, Verdict]]]:
-    """Picture candidates that could be among the best, and shortlist: indices (k,) into `few` and their verdicts."""
-    config = candidate_views.found.config
-    scorers, separation_rad = (
-        scorer_ensemble(config, candidate_views.found.radius_m),
-        math.radians(config.separation_deg),
-    )
+    """Picture candidates that could be among the best, and shortlist: places (k,) in `indices` and their verdicts."""
+    config = candidate_views.candidates.config
+    scorers = scorer_ensemble(config, candidate_views.candidates.radius_m)
+    separation_rad = math.radians(config.separation_deg)
     if config.weights.clip or config.weights.vlm:
-        views = [candidate_views.picture(n, max(config.picture_px, _MODEL_PX)) for n in few.tolist()]
-        found = dict(enumerate(zip(views, scorers.judge(name, views), strict=True)))
-        score = np.array([verdict.score for _, verdict in found.values()])
+        views = [candidate_views.picture(n, max(config.picture_px, _MODEL_PX)) for n in indices.tolist()]
+        pictured = dict(enumerate(zip(views, scorers.judge(name, views), strict=True)))
+        score = np.array([verdict.score for _, verdict in pictured.values()])
     else:
-        found = {}
-        score = np.array([candidate_views.score_bound(n) for n in few.tolist()])
+        pictured = {}
+        score = np.array([candidate_views.score_bound(n) for n in indices.tolist()])
     backs: dict[int, AnchorView] = {}
     while True:
         # A shortlist of exact scores only is final: bounds are never below scores.
         best = shortlist(score, azimuth_rad, config.shortlist, separation_rad, front)
         chosen = (*shortlist(score, azimuth_rad, config.shortlist, separation_rad).tolist(), *best.tolist())
-        open_ones = [n for n in chosen if n not in found]
+        open_ones = [n for n in chosen if n not in pictured]
         if not open_ones:
-            return best, [found[n] for n in best.tolist()]
+            return best, [pictured[n] for n in best.tolist()]
         n = open_ones[0]
-        which = int(few[n])
+        which = int(indices[n])
         if candidate_views.has_back(which) and n not in backs:
             backs[n] = candidate_views.behind.picture(which, config.picture_px)
             score[n] = candidate_views.score_bound(which, backs[n])
             continue
         view = candidate_views.picture(which, config.picture_px, backs.get(n))
-        found[n] = view, scorers.judge(name, [view])[0]
-        score[n] = found[n][1].score
+        pictured[n] = view, scorers.judge(name, [view])[0]
+        score[n] = pictured[n][1].score
 
 
 def _mean(here: Sequence[float], there: Sequence[float]) -> tuple[float, ...]:

@@ -86,7 +86,7 @@ class Candidates:
         return patches_of(self.world, self.instance, self.points)
 
     @cached_property
-    def seen(self) -> Floats:
+    def part_shares(self) -> Floats:
         """Share that they see of each of those parts, (n, t) float64 (`part_visibility.visible_shares`)."""
         return visible_shares(self.positions_m, self.yaw_rad, self.patches, self.world.rays, self.config.fov_deg)
 
@@ -104,7 +104,7 @@ class Candidates:
     @cached_property
     def part_visibility(self) -> Floats:
         """How much of each identifying part they see beside the best of them, (n, t) float64."""
-        return np.asarray(self.seen / np.maximum(self.seen.max(axis=0, initial=0.0), 1e-9))
+        return np.asarray(self.part_shares / np.maximum(self.part_shares.max(axis=0, initial=0.0), 1e-9))
 
     @cached_property
     def off_front_rad(self) -> Floats | None:
@@ -130,10 +130,11 @@ class Candidates:
         away = replace(self, positions_m=positions_m[new], yaw_rad=moved.yaw_rad[new])
         for one in moved, away:
             vars(one).update(alone=self.alone, patches=self.patches)
-        clearance, seen = self.clearance_m[which], self.seen[which]
-        clearance[new], seen[new] = away.clearance_m, away.seen
+        clearance, shares = self.clearance_m[which], self.part_shares[which]
+        clearance[new], shares[new] = away.clearance_m, away.part_shares
         # What is measured already need not be when it is first needed.
-        vars(moved).update(clearance_m=clearance, seen=seen, sight=self.sight.with_rows(which, new, away.sight))
+        sight = self.sight.with_rows(which, new, away.sight)
+        vars(moved).update(clearance_m=clearance, part_shares=shares, sight=sight)
         return moved
 
     def seeing(self, least: float) -> NDArray[np.int64]:
