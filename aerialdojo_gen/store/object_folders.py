@@ -58,11 +58,9 @@ class State:
         if believed_s is None:
             believed_s = math.inf if self._epoch else _LISTING_TTL_S
         with self._lock:
-            made, objects = self._listings.get(group, (-math.inf, {}))
-            if time.monotonic() - made > believed_s:
-                objects = self.bucket.list(group)
-                self._listings[group] = time.monotonic(), objects
-            return objects
+            if group not in self._listings or time.monotonic() - self._listings[group][0] > believed_s:
+                self._listings[group] = time.monotonic(), self.bucket.list(group)
+            return self._listings[group][1]
 
     def put(self, key: str, path: Path) -> Entry:
         """Put a file, and its SHA-256 with it."""
