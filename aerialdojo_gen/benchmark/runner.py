@@ -28,7 +28,7 @@ from aerialdojo_gen.benchmark.journal import Journals
 from aerialdojo_gen.benchmark.tasks import goals_withheld, select
 from aerialdojo_gen.benchmark.worker import Finished, WorkUnit
 from aerialdojo_gen.benchmark.workers import fly_units
-from aerialdojo_gen.pipeline.executors import SharedPaths, make_executor, on_disk
+from aerialdojo_gen.pipeline.executors.base import SharedPaths, make_executor, on_disk
 from aerialdojo_gen.pipeline.interrupt import Interrupts
 from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.store import shards as store

@@ -17,8 +17,7 @@ from aerialdojo_gen.benchmark.evaluation import Evaluation
 from aerialdojo_gen.benchmark.flight import Flight
 from aerialdojo_gen.benchmark.worker import Finished, Worker, WorkUnit
 from aerialdojo_gen.dataset.contents import release_fingerprint
-from aerialdojo_gen.pipeline.executors import Executor, ParentChannel
-from aerialdojo_gen.pipeline.executors.channels import WorkerChannel, at_end
+from aerialdojo_gen.pipeline.executors.base import Executor, ParentChannel, WorkerChannel, at_end
 from aerialdojo_gen.store.root import DataRoot
 
 # Assumed memory per process, megabytes, without an agent's model.

@@ -40,7 +40,7 @@ def stats(
     """Compare the release with the paper's tables; without a release, show what filter kept."""
     from aerialdojo_gen.dataset.contents import existing_files, existing_scenes, no_release, scenes_in_release
     from aerialdojo_gen.dataset.provenance import RECORD
-    from aerialdojo_gen.store.memo import memo, memo_key
+    from aerialdojo_gen.store.cache import memo, memo_key
 
     root, scene = open_root(data), merge_scenes(scenes, scene)
     released = existing_scenes(root)

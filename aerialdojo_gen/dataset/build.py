@@ -174,10 +174,8 @@ def run_stages(
     # A scene without annotations is left out, with a warning that names the mend; the others are finished.
     from aerialdojo_gen.dataset.provenance import check_replaced
     from aerialdojo_gen.pipeline import runner
-    from aerialdojo_gen.pipeline.freshness import cache_footers
     from aerialdojo_gen.pipeline.options import RunOptions
     from aerialdojo_gen.pipeline.progress import Reporter
-    from aerialdojo_gen.store.footers import cached_footers
 
     options, reporter = options or RunOptions(), reporter or Reporter(quiet=True)
     names = runner.chosen_scenes(config, roots, scenes)
@@ -195,12 +193,9 @@ def run_stages(
         if releases:
             _finish_release(config, roots.data, names, ready, not scenes, reporter)
 
-    with cached_footers(roots.data):
-        summaries = runner.run(
-            stages, names, config, roots, options=options, reporter=reporter, prepare=prepare, finish=finish,
-        )  # fmt: skip
-        if any(summary.computed for summary in summaries):
-            cache_footers(stages, ready, roots)
+    summaries = runner.run(
+        stages, ready, config, roots, options=options, reporter=reporter, prepare=prepare, finish=finish,
+    )  # fmt: skip
     exact = config.split.paper_counts or config.annotate_import.paper_counts
     owed = [line for name, line in left_out.items() if exact or name in (scenes or config.scenes)]
     if owed:
@@ -215,7 +210,7 @@ def _finish_release(
     from aerialdojo_gen.dataset.contents import CARD, CROISSANT, existing_files, prune_release
     from aerialdojo_gen.dataset.protocol import SAMPLE, write_sample
     from aerialdojo_gen.dataset.provenance import RECORD, record_makers
-    from aerialdojo_gen.store.memo import cache_text, is_cached, memo_key
+    from aerialdojo_gen.store.cache import cache_text, is_cached, memo_key
 
     if whole:
         # The whole pipeline was asked for: the release holds its scenes and no others.

@@ -20,7 +20,7 @@ from aerialdojo_gen.exchange import lerobot_writer, webdataset_writer
 from aerialdojo_gen.exchange.folder import MARKER, PartialExport, check_target, whole_folder, write_marker
 from aerialdojo_gen.exchange.samples import ExportOptions, Part, plan_parts
 from aerialdojo_gen.pipeline.code_digest import code_of
-from aerialdojo_gen.pipeline.executors import make_executor
+from aerialdojo_gen.pipeline.executors.base import make_executor
 from aerialdojo_gen.pipeline.progress import Reporter, duration
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.atomic import atomic_folder

@@ -19,8 +19,8 @@ from aerialdojo_gen.base.shipped import home
 from aerialdojo_gen.imports.drafting import draft_scene
 from aerialdojo_gen.imports.project import PIPELINE, make_project
 from aerialdojo_gen.pipeline.code_digest import stage_code
-from aerialdojo_gen.pipeline.executors import SharedPaths, make_executor
-from aerialdojo_gen.pipeline.fingerprint import scene_fingerprint
+from aerialdojo_gen.pipeline.executors.base import SharedPaths, make_executor
+from aerialdojo_gen.pipeline.freshness import scene_fingerprint
 from aerialdojo_gen.pipeline.interrupt import Interrupts
 from aerialdojo_gen.pipeline.registry import BY_NAME
 from aerialdojo_gen.pipeline.stage import Job, ProjectPaths

@@ -20,8 +20,7 @@ from aerialdojo_gen.learning.parts import DaggerRound, Exploration, Part, refere
 from aerialdojo_gen.learning.steps import Steps, is_written, read_steps
 from aerialdojo_gen.learning.trajectories import sampling_key
 from aerialdojo_gen.pipeline.code_digest import code_of
-from aerialdojo_gen.pipeline.executors import Executor
-from aerialdojo_gen.pipeline.executors.channels import WorkerChannel
+from aerialdojo_gen.pipeline.executors.base import Executor, WorkerChannel
 from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.store.root import DataRoot
 

@@ -33,7 +33,7 @@ from aerialdojo_gen.learning.recipe import Recipe
 from aerialdojo_gen.learning.steps import Pool, Steps
 from aerialdojo_gen.learning.trajectories import sample_evenly
 from aerialdojo_gen.learning.words import Vocabulary, name_vocabulary
-from aerialdojo_gen.pipeline.executors import make_executor
+from aerialdojo_gen.pipeline.executors.base import make_executor
 from aerialdojo_gen.pipeline.progress import Rate, Reporter, duration
 from aerialdojo_gen.store.atomic import atomic_file, make_folder
 from aerialdojo_gen.store.files import file_digest

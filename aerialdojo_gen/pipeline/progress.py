@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable
 from contextlib import AbstractContextManager, closing
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, TextIO
 
 from tqdm import tqdm
@@ -25,6 +26,7 @@ _PLAIN_EVERY_S, _SILENT_S = 10.0, 30.0
 _NAMED = 3
 # Width of the bar of a whole run, columns.
 _BAR = 6
+_fill = partial(textwrap.fill, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
 _WITHOUT_SPEED = "{l_bar}{bar}| {n_fmt}/{total_fmt} [{elapsed}{postfix}]"
 
 
@@ -57,40 +59,18 @@ class Rate:
         return (done - before) / (now - at) if done > before and now - at >= at - self._began else None
 
 
-class _Lines:
-    """Prints progress lines without a terminal: after items, and occasionally while nothing finishes."""
-
-    def __init__(self, text: Callable[[], str], stream: TextIO) -> None:
-        self._line, self._stream, self._printed_at = text, stream, time.monotonic()
-        self._ended = threading.Event()
-        threading.Thread(target=self._watch, name="progress", daemon=True).start()
-
-    def update(self) -> None:
-        if time.monotonic() - self._printed_at >= _PLAIN_EVERY_S:
-            self._print()
-
-    def close(self) -> None:
-        self._ended.set()
-
-    def _watch(self) -> None:
-        while not self._ended.wait(max(0.1, self._printed_at + _SILENT_S - time.monotonic())):
-            if time.monotonic() - self._printed_at >= _SILENT_S:
-                self._print()
-
-    def _print(self) -> None:
-        self._printed_at = time.monotonic()
-        print(self._line(), file=self._stream, flush=True)
-
-
 class _Shown:
-    """What is shown of progress: a bar of tqdm's on a terminal, else lines."""
+    """What is shown of progress: a bar of tqdm's on a terminal, else lines, also while nothing finishes."""
 
     def __init__(
         self, kind: type[tqdm], text: Callable[[], str], total: float, stream: TextIO, nothing: bool, **bar: Any
     ) -> None:
-        self._lines = None if nothing or stream.isatty() else _Lines(text, stream)
-        disable = nothing or self._lines is not None
-        self._tqdm = kind(total=total, file=stream, leave=False, disable=disable, **bar)
+        self._text, self._stream, self._printed_at = text, stream, time.monotonic()
+        self._in_lines = not (nothing or stream.isatty())
+        self._tqdm = kind(total=total, file=stream, leave=False, disable=nothing or self._in_lines, **bar)
+        self._ended = threading.Event()
+        if self._in_lines:
+            threading.Thread(target=self._watch, name="progress", daemon=True).start()
 
     def advance(self, n: int = 1, frames: int = 0) -> None:
         """Count `n` more items and their video frames."""
@@ -101,8 +81,17 @@ class _Shown:
     def close(self) -> None:
         """Remove the bar."""
         self._tqdm.close()
-        if self._lines:
-            self._lines.close()
+        self._ended.set()
+
+    def _watch(self) -> None:
+        while not self._ended.wait(max(0.1, self._printed_at + _SILENT_S - time.monotonic())):
+            self._print(_SILENT_S)
+
+    def _print(self, least_s: float) -> None:
+        """Print a line unless the last one is younger."""
+        if self._in_lines and time.monotonic() - self._printed_at >= least_s:
+            self._printed_at = time.monotonic()
+            print(self._text(), file=self._stream, flush=True)
 
 
 class Bar(_Shown):
@@ -122,8 +111,7 @@ class Bar(_Shown):
         if frames_per_s:
             self._tqdm.set_postfix_str(f"{frames_per_s:.1f} frames/s", refresh=False)
         self._tqdm.update(n)
-        if self._lines:
-            self._lines.update()
+        self._print(_PLAIN_EVERY_S)
 
     def _line(self) -> str:
         per_s = self._rate.per_s(self._done) if self._done else None
@@ -152,10 +140,6 @@ class Overview:
         """Share of the work done, from 0 to 1."""
         return self.done_s / max(self.done_s + self.left_s, 1e-9)
 
-    def __str__(self) -> str:
-        """Scenes, time left, and running tasks."""
-        return self.text()
-
     def text(self, width: int | None = None) -> str:
         """Describe scenes, time left, and as many running tasks as fit a width."""
         left = duration(self.left_s / max(1, min(self.processes, self.scenes - self.scenes_done)))
@@ -173,7 +157,7 @@ class Overall(_Shown):
     """Shows the progress of a run through several stages, when a shard starts."""
 
     def __init__(self, get_overview: Callable[[], Overview], stream: TextIO, quiet: bool) -> None:
-        self._get_overview, self._stream = get_overview, stream
+        self._get_overview = get_overview
         overview = get_overview()
         super().__init__(
             tqdm, self._line, 1.0, stream, quiet or overview.scenes_done == overview.scenes, dynamic_ncols=True,
@@ -182,16 +166,15 @@ class Overall(_Shown):
 
     def refresh(self) -> None:
         """Show the current progress."""
-        if self._lines:
-            self._lines.update()
-        elif not self._tqdm.disable:
+        self._print(_PLAIN_EVERY_S)
+        if not self._tqdm.disable:
             overview = self._get_overview()
             self._tqdm.n = overview.share
             self._tqdm.set_description_str(overview.text(columns(self._stream) - len(f"100%|{' ' * _BAR}| ")))
 
     def _line(self) -> str:
         overview = self._get_overview()
-        return f"{100 * overview.share:.0f} %, {overview}"
+        return f"{100 * overview.share:.0f} %, {overview.text()}"
 
 
 def columns(stream: TextIO) -> int:
@@ -224,15 +207,7 @@ class Reporter:
         """Write a line, above a bar if there is one."""
         if not self._quiet:
             text = shown(text)
-            if self._stream.isatty():
-                text = textwrap.fill(
-                    text,
-                    columns(self._stream),
-                    subsequent_indent="  ",
-                    break_long_words=False,
-                    break_on_hyphens=False,
-                )
-            tqdm.write(text, file=self._stream)
+            tqdm.write(_fill(text, columns(self._stream)) if self._stream.isatty() else text, file=self._stream)
             self._stream.flush()
 
     def bar(self, label: str, total: int, unit: str = "shards") -> AbstractContextManager[Bar]:

@@ -14,14 +14,13 @@ from aerialdojo_gen.base.config.pipeline import Pipeline
 from aerialdojo_gen.base.errors import AerialDojoError, AssetError, BudgetSpent, UsageError
 from aerialdojo_gen.base.names import choose_scenes, unknown
 from aerialdojo_gen.pipeline.code_digest import stage_code
-from aerialdojo_gen.pipeline.executors import Executor, SharedPaths, make_executor, on_disk
-from aerialdojo_gen.pipeline.freshness import ShardFinder, prefetch_digests
+from aerialdojo_gen.pipeline.executors.base import Executor, SharedPaths, make_executor, on_disk
+from aerialdojo_gen.pipeline.freshness import ShardFinder
 from aerialdojo_gen.pipeline.interrupt import Interrupts
 from aerialdojo_gen.pipeline.options import RunLimits, RunOptions
 from aerialdojo_gen.pipeline.progress import Reporter, duration
 from aerialdojo_gen.pipeline.registry import BY_NAME, STAGES, upstream
-from aerialdojo_gen.pipeline.runtime_estimate import RuntimeEstimate
-from aerialdojo_gen.pipeline.scheduler import SceneScheduler
+from aerialdojo_gen.pipeline.scheduler import RuntimeEstimate, SceneScheduler
 from aerialdojo_gen.pipeline.stage import ProjectPaths, Stage
 from aerialdojo_gen.pipeline.task import Computed, StageSummary, compute
 from aerialdojo_gen.store import shards as store
@@ -40,20 +39,15 @@ def run(
     prepare: Callable[[], None] | None = None,
     finish: Callable[[], None] | None = None,
 ) -> list[StageSummary]:
-    """Run stages in order on the scenes that have their inputs."""
+    """Run stages in order on scenes that lack no input from their author (`scenes_missing_input`)."""
     options, reporter = options or RunOptions(workers=1), reporter or Reporter(quiet=True)
     started = time.monotonic()
     summaries: list[StageSummary] = []
-    for first in stages[:1]:
-        if first.name not in options.force:
-            prefetch_digests(first, scenes, roots)
     for stage in stages:
         # Digest all code now, as loaded: edits during the run make the shards stale next time.
         stage_code(stage.name)
     sources = (roots.scene_assets, roots.recipes, roots.annotations)
     folders = SharedPaths(on_disk(roots.data), sources, on_disk(roots.data), reporter.line)
-    left_out = scenes_missing_input(stages, scenes, roots)
-    scenes = [scene for scene in scenes if scene not in left_out]
     executor_of_run = make_executor(options.executor, options.workers, options.address, folders)
     with roots.data.lock(), Interrupts() as interrupts, executor_of_run as pool:
         if prepare:
@@ -64,7 +58,7 @@ def run(
             roots.data.refresh()
             limits = options.limits if options.limits and group[-1] is stages[-1] else RunLimits()
             finder = ShardFinder(pipeline, roots, scenes, reporter, options.force, limits)
-            scheduler = SceneScheduler(group, scenes, finder, roots.data, reporter, estimate)
+            scheduler = SceneScheduler(group, finder, estimate)
             busy = [stage.name for stage in group if any(estimate.left(stage.name, scene) for scene in scenes)]
             if scheduler and (cold := uncompiled(busy)):
                 reporter.line(f"compiling {', '.join(cold)} to machine code, once: up to two minutes of CPU time")
@@ -104,7 +98,7 @@ def group_stages(stages: Sequence[Stage], *, alone: bool = False) -> list[list[S
     """Group stages between barriers: within a group scenes advance independently."""
     groups: list[list[Stage]] = []
     for stage in stages:
-        if not groups or stage.waits or (alone and stage is stages[-1]):
+        if not groups or stage.barrier or (alone and stage is stages[-1]):
             groups.append([])
         groups[-1].append(stage)
     return groups

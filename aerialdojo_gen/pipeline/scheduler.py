@@ -1,23 +1,28 @@
 """The scheduler: takes each scene through the stages independently, in one process if possible.
 
 A process reuses what it has read and built of a scene in all stages. A scene's next shards are checked for freshness
-when the stage before has written all of its own.
+when the stage before has written all of its own. What each stage is expected to take orders the scenes.
 """
 
 from __future__ import annotations
 
 import time
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Callable, Sequence
 
 from aerialdojo_gen.base.errors import AerialDojoError, BudgetSpent
 from aerialdojo_gen.pipeline.executors.base import TaskQueue
 from aerialdojo_gen.pipeline.freshness import ShardFinder, Shards
-from aerialdojo_gen.pipeline.progress import Overview, Reporter
-from aerialdojo_gen.pipeline.runtime_estimate import RuntimeEstimate
-from aerialdojo_gen.pipeline.stage import Stage
+from aerialdojo_gen.pipeline.progress import Overview
+from aerialdojo_gen.pipeline.stage import ProjectPaths, Stage
 from aerialdojo_gen.pipeline.task import Computed, StageSummary, Task
-from aerialdojo_gen.store.root import DataRoot
+from aerialdojo_gen.store import shards as store
+
+# Bytes of an annotation file for each of its objects, as in those of the 42 scenes.
+_BYTES_PER_OBJECT = 320
+_OBJECTS = 40
+# Weight of the expected seconds, relative to measured ones.
+_PRIOR_S = 10.0
 
 # A second process must first read and build the scene again, which takes about half of that.
 _JOIN_S = 6.0
@@ -26,22 +31,14 @@ _JOIN_S = 6.0
 class SceneScheduler(TaskQueue[Task]):
     """Schedules scenes through the same sequence of stages."""
 
-    def __init__(
-        self,
-        stages: Sequence[Stage],
-        scenes: Sequence[str],
-        finder: ShardFinder,
-        data: DataRoot,
-        reporter: Reporter,
-        estimate: RuntimeEstimate,
-    ) -> None:
+    def __init__(self, stages: Sequence[Stage], finder: ShardFinder, estimate: RuntimeEstimate) -> None:
         super().__init__((), lambda task: task.scene, memory_mb=max(stage.memory_mb for stage in stages))
-        self._stages, self._names, self._data = stages, list(scenes), data
-        self._finder, self._reporter, self._estimate = finder, reporter, estimate
+        self._stages, self._names = stages, list(finder.scenes)
+        self._finder, self._estimate = finder, estimate
         self._totals = [StageSummary(stage.name) for stage in stages]
         self._tasks = Counter[int]()
         # How many stages a scene has behind it, and how many shards of its next one are there, and not done.
-        self._passed = dict.fromkeys(scenes, 0)
+        self._passed = dict.fromkeys(finder.scenes, 0)
         self._shards, self._left = Counter[str](), Counter[str]()
         self._running: dict[tuple[str, int], Task] = {}
         self._ended: set[str] = set()
@@ -58,7 +55,7 @@ class SceneScheduler(TaskQueue[Task]):
     def alone(self) -> bool:
         """Whether there is never more than one task at a time."""
         passed = {scene: passed for scene, passed in self._passed.items() if scene not in self._ended}
-        in_parts = any(stage.in_parts for stage in self._stages[min(passed.values(), default=0) :])
+        in_parts = any(stage.parts for stage in self._stages[min(passed.values(), default=0) :])
         return len(self) <= 1 and len(passed) <= 1 and not (passed and in_parts)
 
     @property
@@ -105,7 +102,7 @@ class SceneScheduler(TaskQueue[Task]):
             self._end([scene])
             return
         # Other processes may have written.
-        self._data.refresh()
+        self._finder.roots.data.refresh()
         while self._passed[scene] < len(self._stages):
             if not self._enter(self._passed[scene], [scene]):
                 return
@@ -169,10 +166,66 @@ class SceneScheduler(TaskQueue[Task]):
     def _summary(self, number: int) -> StageSummary:
         totals, tasks = self._totals[number], self._tasks[number]
         if totals.computed < tasks:
-            left = f"{tasks - totals.computed:,} of {tasks:,} shards are left"
-            self._reporter.line(f"{totals.stage}: the budget is spent, {left}; the same command continues from here")
+            left = f"the budget is spent, {tasks - totals.computed:,} of {tasks:,} shards are left"
+            self._finder.reporter.line(f"{totals.stage}: {left}; the same command continues from here")
         return totals
 
 
 def _part(task: Task) -> str:
     return f" {task.job.part + 1}/{task.job.parts}" if task.job.parts > 1 else ""
+
+
+class RuntimeEstimate:
+    """Seconds of one core left, from the stages' figures scaled by measured times."""
+
+    def __init__(self, stages: Sequence[Stage], scenes: Sequence[str], roots: ProjectPaths) -> None:
+        objects = {scene: objects_of(roots, scene) for scene in scenes}
+        self._expected = {
+            (stage.name, scene): stage.seconds[0] + stage.seconds[1] * objects[scene]
+            for stage in stages
+            for scene in scenes
+        }
+        self._left = dict(self._expected)
+        self._spent_s: defaultdict[str, float] = defaultdict(float)
+        self._expected_s: defaultdict[str, float] = defaultdict(float)
+
+    def record(self, stage: str, scene: str, share: float, seconds: float) -> None:
+        """Record the time of a share of a scene's work."""
+        expected = self._expected[stage, scene] * share
+        self._left[stage, scene] = max(0.0, self._left[stage, scene] - expected)
+        self._spent_s[stage] += seconds
+        self._expected_s[stage] += expected
+
+    def drop(self, stage: str, scene: str) -> None:
+        """Record that a scene has nothing left to do."""
+        self._left[stage, scene] = 0.0
+
+    def left(self, stage: str, scene: str) -> float:
+        """Time left for a scene, seconds of one core."""
+        return self._left[stage, scene] * self._factor(stage)
+
+    @property
+    def done_s(self) -> float:
+        """Time spent, seconds of one core."""
+        return sum(self._spent_s.values())
+
+    @property
+    def left_s(self) -> float:
+        """Time left in total, seconds of one core."""
+        return sum(self.left(*key) for key in self._left)
+
+    def _factor(self, stage: str) -> float:
+        overall = (self.done_s + _PRIOR_S) / (sum(self._expected_s.values()) + _PRIOR_S)
+        return (self._spent_s[stage] + overall * _PRIOR_S) / (self._expected_s[stage] + _PRIOR_S)
+
+
+def objects_of(roots: ProjectPaths, scene: str) -> float:
+    """Estimate the number of objects of a scene from its table, else from the size of its annotation file."""
+    try:
+        return float(store.count_rows(roots.data, "objects", scene))
+    except AerialDojoError:
+        pass
+    try:
+        return (roots.annotations / f"{scene}.json").stat().st_size / _BYTES_PER_OBJECT
+    except OSError:
+        return _OBJECTS

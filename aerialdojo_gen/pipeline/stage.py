@@ -96,24 +96,16 @@ def work_module(stage: str) -> str:
     return f"aerialdojo_gen.pipeline.stages.work.{stage.replace('-', '_')}"
 
 
-def _one_part(_data: DataRoot, _scene: str, _config: Any) -> int:
-    return 1
-
-
-def _no_check(_data: DataRoot, _scenes: Sequence[str], _config: Any) -> None:
-    pass
-
-
 @dataclass(frozen=True)
 class Stage:
-    """A stage of the pipeline; its hooks, the callables, are functions of `aerialdojo_gen.pipeline.stages.hooks`."""
+    """A stage of the pipeline; its hooks, the callables, stand in `aerialdojo_gen.pipeline.registry`."""
 
     name: str  # The command's name, e.g. "anchor-sample"
     help: str  # One line for the command line
     reads: tuple[str, ...]  # Tables (keys of `aerialdojo_gen.store.shards.LAYOUT`), one scene of each
     writes: tuple[str, ...]
-    # Of data, scene and config: the number of shards of a scene; may read upstream tables.
-    parts: Callable[[DataRoot, str, Any], int] = _one_part
+    # Of data, scene and config: the number of shards of a scene, if it can have several; may read upstream tables.
+    parts: Callable[[DataRoot, str, Any], int] | None = None
     # The scene's input files outside the store; their bytes are fingerprinted.
     sources: Callable[[ProjectPaths, str], list[Path]] = lambda _roots, _scene: []
     # Why a scene is left out of this stage and those downstream because its author has not made an input, in a line
@@ -123,15 +115,13 @@ class Stage:
     # installing an extra makes nothing stale.
     idle: Callable[[Any], tuple[str, ...]] = lambda _config: ()
     # Raises an `AerialDojoError` if the inputs of all scenes together are insufficient, before anything is written.
-    check: Callable[[DataRoot, Sequence[str], Any], None] = _no_check
+    check: Callable[[DataRoot, Sequence[str], Any], None] = lambda _data, _scenes, _config: None
     # Decides what the configuration leaves to the machine, and reports it in a line; it is part of the fingerprint.
     resolve_config: Callable[[Any, Callable[[str], None]], Any] = lambda config, _say: config
     # Possible results of `resolve_config`, if it is slow. If all shards are fresh under one, it is not called.
     choices: Callable[[Any], list[Any]] = lambda _config: []
-    # A table that the stage writes and its columns with the path and the SHA-256 of a file (or folder).
-    digests: tuple[str, str, str] | None = None
-    # Whether the stage waits until all scenes have passed the stages before; a `check` implies it. Otherwise scenes
-    # advance independently.
+    # Whether the stage waits until all scenes have passed the stages before, as one with a `check` must. Otherwise
+    # scenes advance independently.
     barrier: bool = False
     # Time per scene, and per object, on one core: orders the scenes, and estimates the time left until there are
     # measurements.
@@ -145,12 +135,6 @@ class Stage:
         output: Output = module.run(job, config)
         return output
 
-    @property
-    def in_parts(self) -> bool:
-        """Whether a scene can have several shards."""
-        return self.parts is not _one_part
-
-    @property
-    def waits(self) -> bool:
-        """Whether all scenes must have passed the stages before."""
-        return self.barrier or self.check is not _no_check
+    def count_parts(self, data: DataRoot, scene: str, config: Any) -> int:
+        """Count a scene's shards."""
+        return self.parts(data, scene, config) if self.parts else 1

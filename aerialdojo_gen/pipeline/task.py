@@ -26,7 +26,7 @@ class Task:
     job: Job
     config: Section  # Its stage's section
     fingerprint: str  # Stored with the shard
-    given: CliContext = field(default_factory=current_context, compare=False)
+    context: CliContext = field(default_factory=current_context, compare=False)
 
     @property
     def label(self) -> str:
@@ -62,7 +62,7 @@ def compute(task: Task) -> Computed:
     started = time.monotonic()
     stage = BY_NAME[job.stage]
     try:
-        with use_context(task.given):
+        with use_context(task.context):
             output = stage.run(job, task.config)
     except AerialDojoError:
         raise
@@ -74,25 +74,15 @@ def compute(task: Task) -> Computed:
     if set(output.tables) != set(stage.writes):
         raise RuntimeError(f"{task.label} returned tables {sorted(output.tables)}, not {sorted(stage.writes)}")
     summary = {"rows_in": output.rows_in, "rows_out": output.rows_out, "counts": dict(sorted(output.counts.items()))}
-    files = {name: _file_info(job, name) for name in sorted(job.files)}
-    for name, table in output.tables.items():
-        store.write_shard(
-            job.roots.data,
-            name,
-            job.scene,
-            job.part,
-            table,
-            fingerprint=task.fingerprint,
-            parts=job.parts,
-            summary=summary,
-            files=files,
-        )
-    return Computed(summary, time.monotonic() - started)
-
-
-def _file_info(job: Job, name: str) -> ShardFile:
     data = job.roots.data
-    return ShardFile(data.size(name), data.digest(name) if name in job.digested else "")
+    files = {
+        name: ShardFile(data.size(name), data.digest(name) if name in job.digested else "")
+        for name in sorted(job.files)
+    }
+    footer: dict[str, Any] = {"fingerprint": task.fingerprint, "parts": job.parts, "summary": summary, "files": files}
+    for name, table in output.tables.items():
+        store.write_shard(data, name, job.scene, job.part, table, **footer)
+    return Computed(summary, time.monotonic() - started)
 
 
 @dataclass

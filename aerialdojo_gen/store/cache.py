@@ -1,25 +1,31 @@
-"""Copies of objects on this machine, by their content: bounded, and shared by all processes of a user.
+"""The user's cache: copies of objects, and what was made of a release's files; bounded, shared by all processes.
 
 ``$AERIALDOJO_CACHE`` (default ``~/.cache/aerialdojo-gen``) holds at most ``$AERIALDOJO_CACHE_GB`` gigabytes
 (default 20); what was used longest ago goes first, except for what a living process uses. An item is a folder under a
-name that is a digest of where the object lies and of its tag; it is made in the staging folder and renamed, so that
-it is whole or not there, whoever is killed and however many processes make the same one.
+name that identifies what is in it (where an object lies and its tag, or what was computed from which files); it is
+made in the staging folder and renamed, so that it is whole or not there, whoever is killed and however many processes
+make the same one.
 """
 
 from __future__ import annotations
 
 import contextlib
 import fcntl
+import hashlib
 import os
 import threading
 from collections import OrderedDict
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from functools import cache
 from pathlib import Path
 
 from aerialdojo_gen.base.environment_errors import number_of
-from aerialdojo_gen.base.errors import disk_error
+from aerialdojo_gen.base.errors import AerialDojoError, disk_error
+from aerialdojo_gen.base.paper_figures import files
+from aerialdojo_gen.store.root import DataRoot
 from aerialdojo_gen.store.staging import remove, staged
 
+_TEXT = "text"
 _DEFAULT_GB = 20.0
 # Items that this process keeps from being removed: the last ones it asked for.
 _HELD = 256
@@ -57,23 +63,25 @@ class Cache:
             number = os.open(path, os.O_RDONLY)
         except OSError:
             return None
+        # Where the file system knows no locks, what is used lately is what stays.
         with contextlib.suppress(OSError):
-            # Where the file system knows no locks, what is used lately is what stays.
             fcntl.flock(number, fcntl.LOCK_SH | fcntl.LOCK_NB)
-        try:
-            same = os.path.samestat(os.fstat(number), path.stat())
-            os.utime(path)
-        except OSError:
-            same = False
-        if not same:
-            os.close(number)
-            return None
+        with contextlib.suppress(OSError):
+            if os.path.samestat(os.fstat(number), path.stat()):
+                os.utime(path)
+                self._hold(path, number)
+                return path
+        os.close(number)
+        return None
+
+    def _hold(self, path: Path, number: int) -> None:
         with self._lock:
-            self._drop(path)
+            dropped = [self._held.pop(path)] if path in self._held else []
             self._held[path] = number
             while len(self._held) > _HELD:
-                self._drop(next(iter(self._held)))
-        return path
+                dropped.append(self._held.popitem(last=False)[1])
+        for number in dropped:
+            os.close(number)
 
     def make(self, name: str, fill: Callable[[Path], None]) -> Path:
         """Return an item's folder; where there is none, one is filled first."""
@@ -85,8 +93,7 @@ class Cache:
 
     def add(self, name: str, folder: Path) -> None:
         """Let a folder of `scratch` become an item; where it is there already, nothing changes."""
-        size = _size(folder)
-        path = self._place(name)
+        size, path = _size(folder), self._place(name)
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             with contextlib.suppress(FileExistsError):
@@ -106,12 +113,10 @@ class Cache:
         for path in self.folder.glob("[0-9a-f][0-9a-f]/*"):
             with contextlib.suppress(OSError):
                 items.append((path.stat().st_mtime, _size(path), path))
-        total = sum(size for _, size, _ in items)
+        excess = sum(size for _, size, _ in items) - self._most
         for _, size, path in sorted(items):
-            if total <= self._most:
-                return
-            if path != latest and self._remove(path):
-                total -= size
+            if excess > 0 and path != latest and self._remove(path):
+                excess -= size
 
     def _remove(self, path: Path) -> bool:
         with contextlib.suppress(OSError):
@@ -126,28 +131,67 @@ class Cache:
                 os.close(number)
         return False
 
-    def _drop(self, path: Path) -> None:
-        number = self._held.pop(path, None)
-        if number is not None:
-            os.close(number)
-
     def _place(self, name: str) -> Path:
         return self.folder / name[:2] / name
 
 
 def cache_folder() -> Path:
     """Return where copies are kept: ``$AERIALDOJO_CACHE``, or the user's cache folder."""
-    value = os.environ.get("AERIALDOJO_CACHE")
-    if value:
+    if value := os.environ.get("AERIALDOJO_CACHE"):
         return Path(value).expanduser().absolute()
-    base = os.environ.get("XDG_CACHE_HOME")
-    return (Path(base) if base else Path.home() / ".cache") / "aerialdojo-gen"
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "aerialdojo-gen"
 
 
 def _size(folder: Path) -> int:
-    total = 0
-    for found, _, names in os.walk(folder):
-        for name in names:
-            with contextlib.suppress(OSError):
-                total += (Path(found) / name).stat().st_size
-    return total
+    return sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
+
+
+def memo_key(root: DataRoot, files: Iterable[str], *parameters: object) -> str:
+    """Identify a result by what was computed from which files by which code."""
+    digest = hashlib.sha256(f"{_sources()}\n{root}\n{parameters!r}".encode())
+    for name in sorted(files):
+        try:
+            version = root.version(name)
+        except FileNotFoundError:
+            version = ""
+        digest.update(f"\n{name}\0{version}".encode())
+    return digest.hexdigest()
+
+
+def memo(key: str, make: Callable[[], str]) -> str:
+    """Return the text that belongs to a key: as it was kept, or as it is made now."""
+    with contextlib.suppress(AerialDojoError, OSError, UnicodeDecodeError):
+        if (found := Cache().find(key)) is not None:
+            return (found / _TEXT).read_text(encoding="utf-8")
+    text = make()
+    cache_text(key, text)
+    return text
+
+
+def is_cached(key: str) -> bool:
+    """Whether something was kept under a key."""
+    with contextlib.suppress(AerialDojoError, OSError):
+        return Cache().find(key) is not None
+    return False
+
+
+def cache_text(key: str, text: str = "") -> None:
+    """Keep a text under a key; nothing happens where the cache cannot be written."""
+
+    def fill(folder: Path) -> None:
+        (folder / _TEXT).write_text(text, encoding="utf-8")
+
+    with contextlib.suppress(AerialDojoError, OSError):
+        Cache().make(key, fill)
+
+
+@cache
+def _sources() -> str:
+    """Return what identifies the package's sources and the paper's figures: others may say other things."""
+    package = Path(__file__).resolve().parents[1]
+    digest = hashlib.sha256()
+    kinds = ("*.py", "*.j2", "*.toml", "*.csv")
+    for path in sorted([*(path for kind in kinds for path in package.rglob(kind)), *files()]):
+        stat = path.stat()
+        digest.update(f"{path}\0{stat.st_size}\0{stat.st_mtime_ns}\n".encode())
+    return digest.hexdigest()

@@ -18,16 +18,14 @@ import platform
 import secrets
 import threading
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from datetime import UTC, datetime, timedelta
 from typing import NamedTuple
 
 from aerialdojo_gen.base.environment_errors import number_of
 from aerialdojo_gen.base.errors import Malformed, StoreError
 from aerialdojo_gen.base.safe_parse import loads_json
-from aerialdojo_gen.store.bucket import Bucket, Content
-from aerialdojo_gen.store.cloud_errors import Changed
+from aerialdojo_gen.store.bucket import Bucket, Changed
 
 _DEFAULT_S = 60.0
 _RENEWALS = 4
@@ -76,66 +74,58 @@ class Lease:
             with suppress(Changed, StoreError, FileNotFoundError):
                 self._bucket.put_bytes(self._key, _encode(_LeaseRecord(self.token, "", 0.0)), etag=self._etag)
 
-    def _record(self) -> bytes:
-        return _encode(_LeaseRecord(self.token, _holder_name(), self._lease_s))
+    def _put(self, *, new: bool = False, etag: str = "") -> str:
+        note = _LeaseRecord(self.token, _holder_name(), self._lease_s)
+        return self._bucket.put_bytes(self._key, _encode(note), new=new, etag=etag).etag
 
     def _take(self) -> str:
-        with suppress(Changed):
-            return self._bucket.put_bytes(self._key, self._record(), new=True).etag
-        warned = False
-        first: Content | None = None
+        seen = ""
         while True:
             try:
                 found = self._bucket.read_small(self._key)
             except FileNotFoundError:
                 with suppress(Changed):
-                    return self._bucket.put_bytes(self._key, self._record(), new=True).etag
+                    return self._put(new=True)
                 continue
             note = _decode(found.data)
             left = (note.lease_s if note else self._lease_s) - found.age_s
             if left <= 0.0:
                 with suppress(Changed):
-                    return self._bucket.put_bytes(self._key, self._record(), etag=found.etag).etag
+                    return self._put(etag=found.etag)
                 continue
-            if first is not None and found.etag != first.etag:
-                raise StoreError(_held_message(self._url, note, left))
-            first = first or found
-            if not warned and left > 1.0:
-                log.warning(
-                    "%s; waiting whether it is renewed", _held_message(self._url, note, left).partition(": wait")[0]
-                )
-            warned = True
+            message = _held_message(self._url, note, left)
+            if seen and found.etag != seen:
+                raise StoreError(f"{message}: wait for it, or use another --data")
+            if not seen and left > 1.0:
+                log.warning("%s; waiting whether it is renewed", message)
+            seen = found.etag
             time.sleep(min(left + 0.05, self._lease_s / _RENEWALS / 2, 2.0))
 
     def _renew(self) -> None:
-        while not self._ended.wait(self._lease_s / _RENEWALS):
+        while not self._lost and not self._ended.wait(self._lease_s / _RENEWALS):
             begun = time.monotonic()
             try:
-                self._etag = self._bucket.put_bytes(self._key, self._record(), etag=self._etag).etag
-                self._renewed = begun
-            except (Changed, FileNotFoundError):
-                if not self._is_still_held():
-                    return
+                try:
+                    self._etag = self._put(etag=self._etag)
+                except (Changed, FileNotFoundError):
+                    self._find_whose_it_is()
                 self._renewed = begun
             except StoreError as error:
                 # It may answer again before the lease is over: `check` says when it is too late.
                 log.warning("the lock of %s is not renewed: %s", self._url, error)
 
-    def _is_still_held(self) -> bool:
-        """Whether the put that renewed it was done after all, its answer being lost on the way."""
+    def _find_whose_it_is(self) -> None:
+        """Ask whether the put that renewed it was done after all, its answer being lost on the way."""
         try:
             found = self._bucket.read_small(self._key)
-            note = _decode(found.data)
         except FileNotFoundError:
             self._lost = "somebody removed it"
-            return False
-        except StoreError:
-            return True
+            return
+        note = _decode(found.data)
         if note is not None and note.token == self.token:
             self._etag = found.etag
-            return True
-        self._lost = f"{note.holder or 'another run'} has it now" if note else "somebody changed it"
-        return False
+        else:
+            self._lost = f"{note.holder or 'another run'} has it now" if note else "somebody changed it"
 
 
 def token_of(bucket: Bucket, key: str) -> str:
@@ -154,23 +144,10 @@ def lease_lost(url: str, why: str) -> StoreError:
     )
 
 
-@contextmanager
-def leased(bucket: Bucket, key: str, url: str) -> Iterator[Lease]:
-    """Hold a lock for the length of the block."""
-    lease = Lease(bucket, key, url)
-    try:
-        yield lease
-    finally:
-        lease.release()
-
-
 def _held_message(url: str, note: _LeaseRecord | None, left_s: float) -> str:
     until = (datetime.now(UTC) + timedelta(seconds=left_s)).strftime("%H:%M:%S UTC")
     holder = note.holder if note else "somebody"
-    return (
-        f"another run is writing to {url}: {holder} holds it until {until}, longer if it is renewed: "
-        "wait for it, or use another --data"
-    )
+    return f"another run is writing to {url}: {holder} holds it until {until}, longer if it is renewed"
 
 
 def _holder_name() -> str:
@@ -190,11 +167,7 @@ def _decode(data: bytes) -> _LeaseRecord | None:
     """Read what a holder put; None for what nobody here put."""
     try:
         fields = loads_json(data)
-    except Malformed:
-        return None
-    try:
-        return _LeaseRecord(
-            str(fields["token"]), str(fields["holder"])[:200], min(max(float(fields["lease_s"]), 0.0), 86400.0)
-        )
-    except (KeyError, TypeError, ValueError):
+        lease_s = min(max(float(fields["lease_s"]), 0.0), 86400.0)
+        return _LeaseRecord(str(fields["token"]), str(fields["holder"])[:200], lease_s)
+    except (Malformed, KeyError, TypeError, ValueError):
         return None

@@ -22,28 +22,35 @@ from __future__ import annotations
 
 import hashlib
 import io
-import re
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from fnmatch import translate
+from fnmatch import fnmatchcase
 from functools import partial
 from pathlib import Path, PurePosixPath
 from typing import Any, BinaryIO, TypeVar
 
 from aerialdojo_gen.base.errors import StoreError
-from aerialdojo_gen.store.bucket import Bucket, Entry
-from aerialdojo_gen.store.cloud_errors import Changed
-from aerialdojo_gen.store.files import sha256_of
-from aerialdojo_gen.store.lease import lease_lost, lease_s, leased, token_of
-from aerialdojo_gen.store.object_folders import MANIFEST, ObjectFolders, state_of
+from aerialdojo_gen.store.bucket import Bucket, Changed, Entry
+from aerialdojo_gen.store.lease import Lease, lease_lost, lease_s, token_of
+from aerialdojo_gen.store.object_folders import (
+    MANIFEST,
+    Files,
+    State,
+    delete_folder,
+    find,
+    is_ours,
+    put_folder,
+    state_of,
+)
 from aerialdojo_gen.store.root import DataRoot, inside
 
 LOCK = ".aerialdojo-lock.json"
-_DIGEST = "sha256"
 _T = TypeVar("_T")
 # Readers of what somebody replaces ask again so often.
 _TRIES = 5
+# What is not in a listing is looked for once more if the listing is older.
+_FRESH_S = 2.0
 
 
 class ObjectRoot(DataRoot):
@@ -102,13 +109,14 @@ class ObjectRoot(DataRoot):
                     self._state.bucket.download(key, file.write, entry)
 
         while True:
-            path: Path = self._state.cache.make(self._item(files), fill) / name
+            path = self._state.cache.make(self._item(files), fill) / name
             if files.keys() != {""} or path.stat().st_size == files[""][1].size:
                 return path
             path.unlink()  # a copy that a power failure cut off
             path.parent.rmdir()
 
-    def _item(self, files: dict[str, tuple[str, Entry]]) -> str:
+    def _item(self, files: Files) -> str:
+        """Name what is copied in the cache."""
         named = [self._state.bucket.endpoint, self._name]
         named += [f"{inner}\0{key}\0{entry.etag}\0{entry.size}" for inner, (key, entry) in sorted(files.items())]
         return hashlib.sha256("\n".join(named).encode("utf-8", "surrogateescape")).hexdigest()
@@ -122,20 +130,15 @@ class ObjectRoot(DataRoot):
         return self._of_one_version(relative, partial(self._digest, reread=reread))
 
     def _digest(self, relative: str, *, reread: bool) -> str:
-        files, state = self._files(relative), self._state
+        files, bucket = self._files(relative), self._state.bucket
         if not reread and files.keys() == {""}:
             key, entry = files[""]
-            if (known := state.digests.get((key, entry.etag))) is not None:
-                return known
-            found, metadata = state.bucket.head(key)
-            if found.etag == entry.etag and len(metadata.get(_DIGEST, "")) == 64:
-                state.digests[key, entry.etag] = metadata[_DIGEST]
-                return metadata[_DIGEST]
+            found, metadata = bucket.head(key)
+            if found.etag == entry.etag and len(metadata.get("sha256", "")) == 64:
+                return metadata["sha256"]
         digest = hashlib.sha256()
         for _, (key, entry) in sorted(files.items()):
-            state.bucket.download(key, digest.update, entry)
-        if files.keys() == {""}:
-            state.digests[files[""][0], files[""][1].etag] = digest.hexdigest()
+            bucket.download(key, digest.update, entry)
         return digest.hexdigest()
 
     def version(self, relative: str) -> str:
@@ -151,88 +154,73 @@ class ObjectRoot(DataRoot):
 
     def list(self, folder: str, pattern: str = "*") -> list[str]:
         """Names under a prefix that match a glob; a folder is one as long as something is in it."""
-        where = inside(folder).strip("/")
-        where = "" if where == "." else where
-        prefix = self._key(where + "/") if where else self._key("")
-        state = self._state
+        where = "" if folder == "." else inside(folder).strip("/")
+        prefix, state = self._key(f"{where}/" if where else ""), self._state
         if "/" not in pattern and "**" not in pattern and (not where or where.startswith("media")):
             names = set(state.bucket.list_names(prefix))
         else:
-            found = state.listing(self._group(where + "/")) if where else state.bucket.list(prefix)
+            found = state.listing(self._group(f"{where}/")) if where else state.bucket.list(prefix)
             names = {key.removeprefix(prefix) for key in found if key.startswith(prefix)}
-        matched = matching((name for name in names if not _is_ours(name)), pattern)
+        matched = matching((name for name in names if not is_ours(name)), pattern)
         return sorted(f"{where}/{name}" if where else name for name in matched)
 
     @contextmanager
     def commit(self, relative: str) -> Iterator[Path]:
         """Make a file in the cache and put it; the copy stays there for who reads it next."""
         key, state = self._key(inside(relative)), self._state
-        name = PurePosixPath(relative).name
         with state.cache.scratch() as folder:
-            yield folder / name
+            path = folder / PurePosixPath(relative).name
+            yield path
             self._may_write()
-            digest = sha256_of(folder / name)
-            entry = state.bucket.put(key, folder / name, {_DIGEST: digest})
-            state.record_write(key, entry)
-            state.digests[key, entry.etag] = digest
-            state.cache.add(self._item({"": (key, entry)}), folder)
+            state.cache.add(self._item({"": (key, state.put(key, path))}), folder)
 
     @contextmanager
     def commit_folder(self, relative: str) -> Iterator[Path]:
         """Make a folder in the cache and put its files; see the module on what readers see meanwhile."""
-        key = self._key(inside(relative).strip("/"))
         with self._state.cache.scratch() as folder:
             yield folder
             self._may_write()
-            ObjectFolders(self._state).put(key, folder, self._may_write)
+            put_folder(self._state, self._key(inside(relative).strip("/")), folder, self._may_write)
 
     def delete(self, relative: str) -> None:
         """Remove an object, and those under it as a folder."""
         self._may_write()
         state, key = self._state, self._key(inside(relative).strip("/"))
-        known = state.listing(self._group(relative)) if "/" in relative else state.bucket.list(key)
+        known = state.listing(self._group(relative))
         if f"{key}/{MANIFEST}" in known:
-            ObjectFolders(state).delete(key)
-            return
-        gone = [name for name in known if name == key or name.startswith(f"{key}/")]
-        if gone:
-            state.bucket.delete(gone)
-        for name in gone:
-            state.record_write(name, None)
+            delete_folder(state, key)
+        else:
+            state.delete([name for name in known if name == key or name.startswith(f"{key}/")])
 
     @contextmanager
     def lock(self) -> Iterator[None]:
         """Hold the prefix by a lease."""
         state = self._state
-        with leased(state.bucket, self._key(LOCK), self.url) as lease:
-            self._token = lease.token
-            state.leases[self.url] = lease
+        lease = state.leases[self.url] = Lease(state.bucket, self._key(LOCK), self.url)
+        self._token = lease.token
+        try:
             state.bucket.abort_uploads(self._key(""))
             self.refresh()
-            try:
-                yield
-                lease.check()
-            finally:
-                self._token = ""
-                del state.leases[self.url]
-                self.refresh()
+            yield
+            lease.check()
+        finally:
+            self._token = ""
+            del state.leases[self.url]
+            lease.release()
+            self.refresh()
 
     def _may_write(self) -> None:
         """Raise StoreError where the lock that this root was handed on with is another's by now."""
         state = self._state
-        if not self._token:
-            return
-        if (lease := state.leases.get(self.url)) is not None:
+        if (lease := state.leases.get(self.url)) is not None and self._token:
             lease.check()
-            return
-        if time.monotonic() - state.checked_at.get(self._token, -1e9) < lease_s() / 4:
-            return
-        if token_of(state.bucket, self._key(LOCK)) != self._token:
-            raise lease_lost(self.url, "another run has it now, or none")
-        state.checked_at[self._token] = time.monotonic()
+        elif self._token and time.monotonic() - state.checked_at.get(self._token, -1e9) >= lease_s() / 4:
+            if token_of(state.bucket, self._key(LOCK)) != self._token:
+                raise lease_lost(self.url, "another run has it now, or none")
+            state.checked_at[self._token] = time.monotonic()
 
     @property
-    def _state(self) -> Any:
+    def _state(self) -> State:
         state = state_of(self._name)
         state.invalidate_before(self._epoch)
         return state
@@ -242,9 +230,9 @@ class ObjectRoot(DataRoot):
 
     def _group(self, relative: str) -> str:
         """Prefix that is listed at once for a file: its table's, or its trajectory's (in a run, its scene's)."""
-        parts = PurePosixPath(relative).parts
-        depth = 1 if not parts or parts[0] != "media" else 2 if self._epoch else 3
-        return self._key("".join(f"{part}/" for part in parts[:depth]))
+        parts = relative.split("/")
+        depth = 1 if parts[0] != "media" else 2 if self._epoch else 3
+        return self._key("/".join(parts[:depth]) + "/" * (len(parts) > depth))
 
     def _file(self, relative: str) -> tuple[str, Entry]:
         """Find a file: its key and entry."""
@@ -253,25 +241,20 @@ class ObjectRoot(DataRoot):
             raise FileNotFoundError(2, "is a folder", self.at(relative))
         return files[""]
 
-    def _files(self, relative: str) -> dict[str, tuple[str, Entry]]:
+    def _files(self, relative: str) -> Files:
         """Find a file (under the name ``""``), or all files of a folder: keys and entries, by their names in it."""
         relative = inside(relative).strip("/")
-        key, state = self._key(relative), self._state
-        if "/" not in relative:
-            files = ObjectFolders(state).find(key, state.bucket.list(key))
-        else:
-            group, parts = self._group(relative), PurePosixPath(relative).parts
-            first = self._key("/".join(parts[:3])) if parts[0] == "media" and len(parts) > 2 else ""
-            files = ObjectFolders(state).find(key, state.listing(group), first)
-            if not files and state.is_stale(group):
-                files = ObjectFolders(state).find(key, state.listing(group, reread=True), first)
-        if not files:
-            raise FileNotFoundError(2, "there is no such file or folder", self.at(relative))
-        return files
-
-
-def _is_ours(name: str) -> bool:
-    return any(part.startswith(".aerialdojo-") for part in name.split("/"))
+        for believed_s in (None, _FRESH_S):
+            objects = self._state.listing(self._group(relative), believed_s)
+            parts = relative.split("/")
+            if parts[0] == "media" and len(parts) > 2:
+                manifest = self._key("/".join([*parts[:3], MANIFEST]))
+                if manifest not in objects:
+                    # What a listing has of a folder that is being written was put after the folder's manifest.
+                    objects = objects | self._state.bucket.list(manifest)
+            if files := find(self._state, self._key(relative), objects):
+                return files
+        raise FileNotFoundError(2, "there is no such file or folder", self.at(relative))
 
 
 class _Ranges(io.RawIOBase):
@@ -286,12 +269,8 @@ class _Ranges(io.RawIOBase):
     def seekable(self) -> bool:
         return True
 
-    def tell(self) -> int:
-        return self._at
-
     def seek(self, offset: int, whence: int = 0) -> int:
-        base = {0: 0, 1: self._at, 2: self._entry.size}[whence]
-        self._at = max(0, base + offset)
+        self._at = max(0, offset + (0, self._at, self._entry.size)[whence])
         return self._at
 
     def readinto(self, buffer: Any) -> int:
@@ -308,15 +287,11 @@ class _Ranges(io.RawIOBase):
 
 
 def matching(names: Iterable[str], pattern: str) -> set[str]:
-    """Return the names, and the folders that they lie in, that match a glob as `Path.glob` does."""
-    words = [re.compile(translate(part)) if part != "**" else None for part in pattern.split("/")]
+    """Return the names, and the folders that they lie in, that match a glob as `Path.glob` does, by parts."""
     every = {"/".join(parts[:n]) for name in names for parts in [name.split("/")] for n in range(1, len(parts) + 1)}
-    return {name for name in every if _matches(name.split("/"), words)}
-
-
-def _matches(parts: list[str], words: list[re.Pattern[str] | None]) -> bool:
-    if not words:
-        return not parts
-    if words[0] is None:
-        return any(_matches(parts[n:], words[1:]) for n in range(len(parts) + (len(words) > 1)))
-    return bool(parts) and words[0].fullmatch(parts[0]) is not None and _matches(parts[1:], words[1:])
+    if pattern == "**/*":
+        return every
+    words = pattern.split("/")
+    return {
+        name for name in every if name.count("/") == len(words) - 1 and all(map(fnmatchcase, name.split("/"), words))
+    }

@@ -11,16 +11,16 @@ import fcntl
 import fnmatch
 import os
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
-from typing import BinaryIO, TextIO, TypeAlias
+from typing import BinaryIO, TypeAlias
 
 from aerialdojo_gen.base.errors import StoreError, UsageError, disk_error
 from aerialdojo_gen.store import files
 from aerialdojo_gen.store.atomic import atomic_file, atomic_folder
-from aerialdojo_gen.store.staging import remove, staged, sweep, sweep_unstaged
+from aerialdojo_gen.store.staging import remove, staged, sweep
 
 
 class DataRoot(ABC):
@@ -51,9 +51,6 @@ class DataRoot(ABC):
 
         `reread` reads the bytes also where their digest is known; FileNotFoundError where there are none.
         """
-
-    def prefetch_digests(self, names: Iterable[str]) -> None:  # noqa: B027 - what would cost requests is not asked twice
-        """Begin to read files whose digests will be asked for, while other things are done, where that helps."""
 
     @abstractmethod
     def version(self, relative: str) -> str:
@@ -146,10 +143,6 @@ class LocalRoot(DataRoot):
         path = self._at(relative)
         return files.sha256_of(path) if reread or path.is_dir() else files.file_digest(path)
 
-    def prefetch_digests(self, names: Iterable[str]) -> None:
-        """Read files in a thread, for `digest` to find."""
-        files.prefetch_files(self._at(name) for name in names)
-
     def version(self, relative: str) -> str:
         """Inode, size and times of the file: one that is replaced or written to is another."""
         stat = os.stat(self._path_text(relative))
@@ -213,7 +206,6 @@ class LocalRoot(DataRoot):
                 ) from None
             except OSError as error:
                 raise disk_error(error, path) from None
-            self._sweep_once(file)
             sweep(self.path)
             # At the end, after this run's own item: what workers were at when an error or Ctrl-C ended them.
             stack.callback(sweep, self.path)
@@ -223,25 +215,12 @@ class LocalRoot(DataRoot):
                 stack.enter_context(staged(self.path, path))
             yield
 
-    def _sweep_once(self, lock: TextIO) -> None:
-        """Remove what killed runs of earlier versions left, once in a data directory's life."""
-        lock.seek(0)
-        if not lock.read():
-            sweep_unstaged(self.path)
-            lock.write("staged\n")
-            lock.flush()
-
     def _at(self, relative: str) -> Path:
         return self.path / inside(relative)
 
     def _path_text(self, relative: str) -> str:
         # What a run asks of thousands of files is asked by their names: making a Path takes longer than the answer.
         return f"{self.path}/{inside(relative)}"
-
-
-def changed_ns(version: str) -> int:
-    """When a file of a `LocalRoot` was last changed, nanoseconds since the epoch, by its version."""
-    return int(version.rpartition("-")[2])
 
 
 def is_outside(root: DataRoot, path_text: str) -> bool:

@@ -9,9 +9,7 @@ Every function takes a data root, or a directory or URL to open as one.
 
 from __future__ import annotations
 
-import contextlib
-import time
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -20,7 +18,7 @@ import pyarrow as pa
 
 from aerialdojo_gen.base.cli_context import command
 from aerialdojo_gen.base.errors import DamagedFile, StoreError, first_line
-from aerialdojo_gen.store.footers import ShardFile, ShardInfo, decode, encode, footer_cache
+from aerialdojo_gen.store.footers import ShardFile, ShardInfo, decode, encode
 from aerialdojo_gen.store.layout import (
     LAYOUT,
     Place,
@@ -80,9 +78,6 @@ def read_info(data: Where, name: str) -> ShardInfo:
 @lru_cache(maxsize=8192)
 def _read_info(root: DataRoot, name: str, version: str) -> ShardInfo:
     # A shard is never written to, only replaced; a run asks for the same footer half a dozen times.
-    known, begun_ns = footer_cache(), time.time_ns()
-    if known is not None and (cached := known.find(root, name, version)) is not None:
-        return cached
     from aerialdojo_gen.store.parquet_files import read_footer
 
     where, hint = root.at(name), "delete it and run the command again"
@@ -101,19 +96,7 @@ def _read_info(root: DataRoot, name: str, version: str) -> ShardInfo:
         raise DamagedFile(f"{where} is damaged ({error}): {hint}") from None
     if info.rows != rows:
         raise DamagedFile(f"{where} has {rows:,} rows where {info.rows:,} were written: {hint}")
-    if known is not None:
-        known.record(root, name, version, begun_ns, info)
     return info
-
-
-def cache_footers(root: DataRoot, names: Sequence[str]) -> None:
-    """Let the `FooterCache` keep what shards' footers say; those that are damaged are left out."""
-    if footer_cache() is None:
-        return
-    for name in names:
-        with contextlib.suppress(StoreError, OSError):
-            # Read once more what was read as soon as it was written: a change right after that could hide.
-            _read_info.__wrapped__(root, name, root.version(name))
 
 
 def count_rows(data: Where, table: str, scene: str) -> int:
@@ -140,63 +123,55 @@ def _parts(data: Where, table: str, scene: str, run: str = "default") -> dict[st
 def read_scene(
     data: Where, table: str, scene: str, columns: Sequence[str] | None = None, run: str = "default"
 ) -> pa.Table:
-    """Read all of a scene's rows of a table."""
-    from aerialdojo_gen.store.parquet_files import read_file
-    from aerialdojo_gen.store.tables import column_digests
-
-    root = open_root(data)
-    spec = LAYOUT[table].spec
+    """Read all of a scene's rows of a table, with nulls for columns that its shards lack and may lack."""
+    root, spec = open_root(data), LAYOUT[table].spec
     schema = spec.schema if columns is None else pa.schema([spec.schema.field(name) for name in columns])
-    hint = f"delete it and run {command(LAYOUT[table].command, scene=scene)}"
     tables = []
     for name, info in _parts(root, table, scene, run).items():
-        where = root.at(name)
-        try:
-            if columns is None:
-                shard = read_file(root.local_copy(name), None, where)
-                stored = _stored(schema, shard.column_names)
-            else:
-                stored = _stored(schema, info.columns or columns)
-                shard = read_file(root.local_copy(name), stored, where)
-        except FileNotFoundError:
-            raise StoreError(f"{where} was removed while it was read: run the command again") from None
-        except DamagedFile as error:
-            raise DamagedFile(f"{error}: {hint}") from None
-        if not shard.schema.equals(pa.schema([schema.field(name) for name in stored])):
-            raise StoreError(f"{where} has other columns than this version's {spec.name}: {hint}")
-        # The checksums of Parquet's pages do not say which column a page is of, nor what its values mean.
-        if info.columns and any(info.columns.get(name) != own for name, own in column_digests(shard).items()):
-            raise DamagedFile(f"{where} is damaged (other rows than were written): {hint}")
-        tables.append(pa.Table.from_arrays(_with_nulls(shard, schema), schema=schema.remove_metadata()))
+        stored = pa.schema([field for field in schema if field.name in info.columns or not field.nullable])
+        foreign = info.columns.keys() - set(spec.schema.names) if columns is None else set()
+        fits = not foreign and set(stored.names) <= info.columns.keys()
+        shard = _read_shard(root, table, scene, name, info, stored.names) if fits else None
+        if shard is None or not shard.schema.equals(stored):
+            raise StoreError(
+                f"{root.at(name)} has other columns than this version's {spec.name}: {_hint(table, scene)}"
+            )
+        arrays = [shard[f.name] if f.name in stored.names else pa.nulls(shard.num_rows, f.type) for f in schema]
+        tables.append(pa.Table.from_arrays(arrays, schema=schema.remove_metadata()))
     return pa.concat_tables(tables)
-
-
-def _stored(schema: pa.Schema, stored_names: Collection[str]) -> list[str]:
-    """Name the columns to be found in a shard: all but those that may be null and are not there."""
-    return [field.name for field in schema if field.name in stored_names or not field.nullable]
-
-
-def _with_nulls(shard: pa.Table, schema: pa.Schema) -> list[pa.ChunkedArray | pa.Array]:
-    """Return a shard's columns in the schema's order, nulls for those that it lacks."""
-    stored_names = set(shard.column_names)
-    return [shard[f.name] if f.name in stored_names else pa.nulls(shard.num_rows, f.type) for f in schema]
 
 
 def read_stored(data: Where, table: str, scene: str, columns: Sequence[str]) -> pa.Table:
     """Read those of some columns that a scene's shards have, whatever version wrote them."""
+    root = open_root(data)
+    parts = _parts(root, table, scene)
+    stored = [name for name in columns if all(name in info.columns for info in parts.values())]
+    shards = [_read_shard(root, table, scene, name, info, stored) for name, info in parts.items()]
+    return pa.concat_tables([shard.replace_schema_metadata(None) for shard in shards])
+
+
+def _read_shard(
+    root: DataRoot, table: str, scene: str, name: str, info: ShardInfo, columns: Sequence[str]
+) -> pa.Table:
+    """Read columns of a shard, and compare them with the digests in its footer."""
     from aerialdojo_gen.store.parquet_files import read_file
     from aerialdojo_gen.store.tables import column_digests
 
-    root = open_root(data)
-    parts = _parts(root, table, scene)
-    stored_names = [name for name in columns if all(name in info.columns for info in parts.values())]
-    tables = []
-    for name, info in parts.items():
-        shard = read_file(root.local_copy(name), stored_names, root.at(name)).replace_schema_metadata(None)
-        if any(info.columns[column] != own for column, own in column_digests(shard).items()):
-            raise DamagedFile(f"{root.at(name)} is damaged (other rows than were written): delete it")
-        tables.append(shard)
-    return pa.concat_tables(tables)
+    where, hint = root.at(name), _hint(table, scene)
+    try:
+        shard = read_file(root.local_copy(name), columns, where)
+    except FileNotFoundError:
+        raise StoreError(f"{where} was removed while it was read: run the command again") from None
+    except DamagedFile as error:
+        raise DamagedFile(f"{error}: {hint}") from None
+    # The checksums of Parquet's pages do not say which column a page is of, nor what its values mean.
+    if any(info.columns[column] != digest for column, digest in column_digests(shard).items()):
+        raise DamagedFile(f"{where} is damaged (other rows than were written): {hint}")
+    return shard
+
+
+def _hint(table: str, scene: str) -> str:
+    return f"delete it and run {command(LAYOUT[table].command, scene=scene)}"
 
 
 def prune(data: Where, table: str, scene: str, parts: int) -> None:

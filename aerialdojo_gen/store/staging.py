@@ -13,7 +13,6 @@ import contextlib
 import errno
 import fcntl
 import os
-import re
 import secrets
 import shutil
 import tempfile
@@ -26,7 +25,6 @@ AREA = ".aerialdojo-staging"
 _LEASE, _OLD = "lease", "old"
 # How long others may take the area away before an item is in it. A number of tries would be used up in a millisecond.
 _PATIENCE_S = 30.0
-_UNSTAGED = re.compile(r"\.(?P<name>.+)\.\d+\.(?P<kind>tmp|old)(\.[A-Za-z0-9]+)?")
 NO_LOCKS = (errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOTSUP, errno.ENOSYS, errno.EINVAL)
 
 
@@ -105,17 +103,6 @@ def _recover(root: Path, item: Path, relative: str) -> None:
     # The old one is moved away only when the new one is whole and on the disk.
     new = next((path for path in item.iterdir() if path.name not in (_LEASE, _OLD)), old)
     new.rename(target)
-
-
-def sweep_unstaged(data: Path) -> None:
-    """Remove from a data directory, while it is held, what earlier versions made: ``.NAME.PID.tmp`` and ``.old``."""
-    for pattern in ("meshes/.*", "release/.*", "release/*/.*", "release/*/*/.*", "[!.]*/*/.*"):
-        for path in data.glob(pattern):
-            match = _UNSTAGED.fullmatch(path.name)
-            if match and match["kind"] == "old" and not os.path.lexists(path.with_name(match["name"])):
-                path.rename(path.with_name(match["name"]))
-            elif match:
-                remove(path)
 
 
 def _discard(item: Path) -> None:

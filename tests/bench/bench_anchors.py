@@ -31,8 +31,9 @@ MEASURES = ("seen", "framed", "open", "told", "parts", "front")
 
 
 def measures(found, chosen, radius_m, config):
-    looked = CandidateViews.of(found, np.array(chosen), config)
-    for view in looked.pictures(np.arange(len(chosen)), config.picture_px, config.fov_deg):
+    looked = CandidateViews.of(found, np.array(chosen))
+    for n in range(len(chosen)):
+        view = looked.picture(n, config.picture_px)
         terms = judge(view, radius_m, config.standoff_m)
         off_front_rad = view.known.off_front_rad
         front = None if off_front_rad is None else off_front_rad <= FRONT_RAD

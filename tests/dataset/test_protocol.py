@@ -10,7 +10,7 @@ from aerialdojo_gen.base.errors import StoreError, UsageError
 from aerialdojo_gen.base.paper_figures import inventory, splits
 from aerialdojo_gen.benchmark.tasks import Selection, select
 from aerialdojo_gen.dataset.protocol import SAMPLE, draw_sample, read_sample, sample_shortfall
-from aerialdojo_gen.pipeline.stages.work.quota import train_quotas
+from aerialdojo_gen.pipeline.stages.work.candidate_policy import train_quotas
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.schemas import FAMILIES
 

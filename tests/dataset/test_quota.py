@@ -13,15 +13,15 @@ from aerialdojo_gen.base.paper_figures import inventory, splits
 from aerialdojo_gen.cli.common import open_pipeline
 from aerialdojo_gen.pipeline import runner
 from aerialdojo_gen.pipeline.runner import stages_named
-from aerialdojo_gen.pipeline.stages.work.candidate_pool import pool_lines, pool_of, require_pools
-from aerialdojo_gen.pipeline.stages.work.quota import (
+from aerialdojo_gen.pipeline.stages.work.candidate_policy import (
     Accepted,
     apportion,
     difficulty_level,
     select_quota,
     train_quotas,
 )
-from aerialdojo_gen.pipeline.stages.work.task_ids import held_out, key_of, reference_id
+from aerialdojo_gen.pipeline.stages.work.candidate_pool import pool_lines, pool_of, require_pools
+from aerialdojo_gen.pipeline.stages.work.split import held_out, key_of, reference_id
 
 SETTINGS = {"base": (5.0, 30.0), "standard": (30.0, 60.0), "long_horizon": (60.0, 100.0)}
 

@@ -22,7 +22,7 @@ from aerialdojo_gen.dataset.stats.figures.style import SETTING_COLOURS, save
 from aerialdojo_gen.dataset.stats.frames import read_goals, read_tasks
 from aerialdojo_gen.dataset.stats.measures import difficulty_tables, goal_tables
 from aerialdojo_gen.dataset.stats.tables import Made, benchmark_table, in_paper_order, made_of, tables
-from aerialdojo_gen.pipeline.stages.work.quota import train_quotas
+from aerialdojo_gen.pipeline.stages.work.candidate_policy import train_quotas
 from aerialdojo_gen.store import schemas
 
 

@@ -23,7 +23,7 @@ from support.releases import files_of
 
 from aerialdojo_gen.base.config.pipeline import Pipeline
 from aerialdojo_gen.dataset.validate import ValidationOptions, validate
-from aerialdojo_gen.pipeline.stages.work.task_ids import key_of, nav_id
+from aerialdojo_gen.pipeline.stages.work.split import key_of, nav_id
 
 OBJECTS = "release/objects"
 

@@ -84,8 +84,8 @@ def test_the_same_file_makes_the_same_bytes(hill, added, tmp_path):
 
 
 def test_the_heights_lie_beside_the_plan_and_count_as_its_source(hill, tmp_path):
+    from aerialdojo_gen.pipeline.registry import scene_sources
     from aerialdojo_gen.pipeline.stage import ProjectPaths
-    from aerialdojo_gen.pipeline.stages.hooks import scene_sources
 
     place = add_terrain("Hill", hill, tmp_path / "mine", ReliefOptions(bare=True))
     assert maps.same_scene(build_scene(place.recipe, catalogue()), place.scene)

@@ -35,7 +35,7 @@ from aerialdojo_gen.learning.recipe import load_recipe
 from aerialdojo_gen.learning.steps import read_steps
 from aerialdojo_gen.learning.trajectories import sample_evenly
 from aerialdojo_gen.pipeline.code_digest import code_of
-from aerialdojo_gen.pipeline.executors import make_executor
+from aerialdojo_gen.pipeline.executors.base import make_executor
 from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.planning.difficulty import agent_actions
 from aerialdojo_gen.planning.flight_space import FlightSpace

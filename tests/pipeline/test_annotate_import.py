@@ -17,7 +17,6 @@ from aerialdojo_gen.base.errors import AnnotationError, UsageError
 from aerialdojo_gen.pipeline.stage import Job, ProjectPaths
 from aerialdojo_gen.pipeline.stages.work import annotate_import
 from aerialdojo_gen.scenes.model import Scene
-from aerialdojo_gen.store.schemas import LANDMARKS, OBJECTS
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -45,24 +44,6 @@ def _changed(k, **changes):
     objects = list(annotations.objects)
     objects[k] = objects[k].model_copy(update=changes)
     return dataclasses.replace(annotations, objects=tuple(objects))
-
-
-def test_tables_of_a_right_file(tmp_path):
-    job = _job(tmp_path, format_annotations(street_annotations()))
-    output = annotate_import.run(job, AnnotateImportConfig())
-    landmarks, objects = output.tables["landmarks"], output.tables["objects"]
-    assert landmarks.schema.equals(LANDMARKS.schema)
-    assert objects.schema.equals(OBJECTS.schema)
-    scene = street()
-    for row in objects.to_pylist():
-        instance = scene[row["mesh_node"]]
-        centre = np.array([row[f"{a}_m"] for a in "xyz"])
-        size = np.array([row[f"size_{a}_m"] for a in "xyz"])
-        np.testing.assert_array_equal(centre - size / 2, instance.bounds[0])
-        np.testing.assert_array_equal(centre + size / 2, instance.bounds[1])
-    assert objects["direction"].to_pylist() == ["northeast", "northeast", "northeast", "west"]
-    assert objects["object_id"].to_pylist() == [0, 1, 2, 3]
-    assert output.rows_out == 5
 
 
 def test_a_missing_file_is_named(tmp_path):

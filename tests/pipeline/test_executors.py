@@ -12,7 +12,7 @@ from support import chores, preload
 from support.chores import Chore
 
 from aerialdojo_gen.base.errors import AerialDojoError, MissingPackage, UsageError
-from aerialdojo_gen.pipeline.executors import ParentChannel, SharedPaths, make_executor
+from aerialdojo_gen.pipeline.executors.base import ParentChannel, SharedPaths, make_executor
 
 TESTS = Path(__file__).resolve().parents[1]
 RAY = pytest.param("ray", marks=pytest.mark.ray)
@@ -177,7 +177,7 @@ PROGRAM = """
 import sys
 from pathlib import Path
 from support import chores, preload
-from aerialdojo_gen.pipeline.executors import ParentChannel, make_executor
+from aerialdojo_gen.pipeline.executors.base import ParentChannel, make_executor
 from aerialdojo_gen.pipeline.interrupt import Interrupts
 from aerialdojo_gen.pipeline.progress import Reporter
 

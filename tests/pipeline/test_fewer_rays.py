@@ -17,10 +17,9 @@ from aerialdojo_gen.geometry.rays import instance_caster
 from aerialdojo_gen.geometry.viewpoints import shortlist
 from aerialdojo_gen.pipeline.scoring.ensemble import scorer_ensemble
 from aerialdojo_gen.pipeline.scoring.views import part_shares
-from aerialdojo_gen.pipeline.stages.work.anchor_pictures import CandidateViews, best_pictured
+from aerialdojo_gen.pipeline.stages.work.anchor_pictures import CandidateViews, best_pictured, fitting_m, steps_back_m
 from aerialdojo_gen.pipeline.stages.work.anchor_sample import candidates_of
 from aerialdojo_gen.pipeline.stages.work.anchor_world import Candidates
-from aerialdojo_gen.pipeline.stages.work.camera_pullback import fitting_m, steps_back_m
 from aerialdojo_gen.pipeline.stages.work.reference_images import MIN_SHARE, instance_map, instance_mask
 from aerialdojo_gen.planning.collision import collision_world
 from aerialdojo_gen.rendering.backend import open_renderer
@@ -109,9 +108,10 @@ def test_candidates_that_are_moved_are_what_they_are_where_they_are_moved_to(fou
     which = np.arange(0, len(found.positions_m), 2)
     places = found.positions_m[which] + np.where(which[:, None] % 4, [0.3, -0.2, 0.1], 0.0)
     moved = found.moved(which, places)
-    anew = Candidates.of(found.world, found.instance, found.points, places, found.yaw_rad[which], RADIUS, CONFIG)
+    anew = Candidates(found.world, found.instance, found.points, places, found.yaw_rad[which], RADIUS, CONFIG)
     for name in (
-        "positions_m", "yaw_rad", "elevation_deg", "clearance_m", "seen", "part_visibility", "off_front_rad", "rank",
+        "positions_m", "yaw_rad", "elevation_deg", "clearance_m", "part_shares", "part_visibility", "off_front_rad",
+        "rank",
     ):  # fmt: skip
         np.testing.assert_array_equal(getattr(moved, name), getattr(anew, name), err_msg=name)
     for name in ("visible_fraction", "framed", "shown", "box_fraction", "off_centre"):
@@ -121,7 +121,7 @@ def test_candidates_that_are_moved_are_what_they_are_where_they_are_moved_to(fou
 def test_no_picture_scores_more_than_its_bound_and_the_best_are_those_of_all_pictures(found, monkeypatch):
     picture, taken = CandidateViews.picture, []
     monkeypatch.setattr(CandidateViews, "picture", lambda self, n, *how: taken.append(n) or picture(self, n, *how))
-    looked = CandidateViews.of(found, found.seeing(CONFIG.min_visible_fraction), CONFIG)
+    looked = CandidateViews.of(found, found.seeing(CONFIG.min_visible_fraction))
     away = found.positions_m - found.world.scene.instances[found.instance].centroid
     turn = np.arctan2(away[:, 1], away[:, 0])[looked.which]
     front, apart = found.before_front[looked.which], math.radians(CONFIG.separation_deg)
@@ -129,12 +129,12 @@ def test_no_picture_scores_more_than_its_bound_and_the_best_are_those_of_all_pic
     windows = range(0, len(looked.which) - 6, 18)
     for first in windows:
         few = np.arange(first, first + 6)
-        views = looked.pictures(few, CONFIG.picture_px, CONFIG.fov_deg)
+        views = [looked.picture(int(n), CONFIG.picture_px) for n in few]
         verdicts = scorer_ensemble(CONFIG, RADIUS).judge("kiosk", views)
         score = np.array([verdict.score for verdict in verdicts])
-        assert all(s <= looked.most(int(n), RADIUS, CONFIG.standoff_m) for n, s in zip(few, score, strict=True))
+        assert all(s <= looked.score_bound(int(n)) for n, s in zip(few, score, strict=True))
         taken.clear()
-        best, shown = best_pictured("kiosk", looked, few, turn[few], front[few], RADIUS, CONFIG)
+        best, shown = best_pictured("kiosk", looked, few, turn[few], front[few])
         lazily += len(taken)
         assert best.tolist() == shortlist(score, turn[few], CONFIG.shortlist, apart, front[few]).tolist()
         assert [verdict for _, verdict in shown] == [verdicts[n] for n in best]

@@ -108,12 +108,6 @@ def test_the_start_looks_away_from_its_own_anchor(tmp_path):
     assert told["1_0__2"] == (0.0, None)
 
 
-def test_what_stands_between_hides_the_target(tmp_path):
-    places, wall = [(0.0, 0.0, 2.0), (20.0, 0.0, 2.0)], instance("wall", box((9, -9, 0), (9.5, 9, 9)))
-    rows = pair(tmp_path, anchor_rows(places, variants=1), others=(wall,)).tables["pairs"].to_pylist()
-    assert [(r["target_visible_at_start"], r["visible_view_at_start"]) for r in rows] == [(0.0, None)] * 2
-
-
 def test_what_shows_through_a_narrow_gap_is_seen(tmp_path):
     """A centimetre between two fences: a fiftieth of what the ball would show."""
     places = [(0.0, 0.0, 2.0), (20.0, 0.0, 2.0)]

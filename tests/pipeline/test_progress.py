@@ -122,7 +122,7 @@ def test_without_a_terminal_a_line_comes_now_and_then_while_nothing_is_finished(
     monkeypatch.setattr(progress, "_SILENT_S", 0.1)
     stream = io.StringIO()
     reporter = Reporter(stream=stream)
-    expected = "plan: 0/3 shards" if kind == "bar" else f"25 %, {list(overviews())[1]}"
+    expected = "plan: 0/3 shards" if kind == "bar" else f"25 %, {list(overviews())[1].text()}"
     with reporter.bar("plan", 3) if kind == "bar" else reporter.overall(lambda: list(overviews())[1]):
         chores.until(lambda: stream.getvalue().count("\n") >= 2)
     assert set(stream.getvalue().splitlines()) == {expected}
@@ -132,8 +132,8 @@ def test_how_far_a_run_is_in_words():
     start, half, end = overviews()
     assert [one.share for one in (start, half, end)] == [0.0, 0.25, 1.0]
     # Two processes share what is left; of the last scene's there is none to share.
-    assert str(half) == ("9/42 scenes, ~2 min 30 s left: U_ConstructionSite_1 plan 3/8, N_Forest_0 anchor-sample")
-    assert str(end).endswith("D_Flood_1 build-scenes +1")
+    assert half.text() == ("9/42 scenes, ~2 min 30 s left: U_ConstructionSite_1 plan 3/8, N_Forest_0 anchor-sample")
+    assert end.text().endswith("D_Flood_1 build-scenes +1")
     assert [duration(s) for s in (0.4, 59.6, 200.0, 7800.0)] == ["0 s", "1 min 0 s", "3 min 20 s", "2 h 10 min"]
 
 

@@ -100,6 +100,11 @@ def test_what_was_killed_and_interrupted_goes_on_to_the_same_bytes(project, run,
     assert snapshot(copy) == snapshot(smoke)
     assert {path: path.stat().st_mtime_ns for path in kept} == kept
 
+    before = {path: path.stat().st_mtime_ns for path in copy.rglob("*.*")}
+    code, err = run(copy)
+    assert (code, err.count("; nothing to do; ")) == (0, 1), "what was asked for, not what it builds on"
+    assert {path: path.stat().st_mtime_ns for path in before} == before, "nothing changed, nothing is written"
+
 
 def test_a_little_of_the_torture(bench, monkeypatch):
     """A command is killed at one of its calls and repeated, and every byte compared: a file left over is noticed."""
@@ -153,26 +158,3 @@ def test_whatever_is_damaged_is_named_and_made_again(run, smoke, copy):
     for path in mesh, other:
         assert f"{path} is missing or damaged: computed again" in err
     assert snapshot(copy) == snapshot(smoke)
-
-
-def test_what_versions_before_left_is_removed_once_and_an_old_recording_comes_back(run, copy):
-    (copy / ".lock").write_text("")
-    recording = min((copy / "media" / "U_Courtyard_0").iterdir())
-    recording.rename(recording.with_name(f".{recording.name}.4242.old"))
-    for left in (
-        "meshes/.U_Courtyard_0.glb.4242.tmp.glb", "release/.README.md.4242.tmp.md",
-        "plans/U_Courtyard_0/.part-00000.parquet.4242.tmp.parquet", "media/U_Gone_0/.nav.4242.tmp/front_rgb.mp4",
-        "release/tasks/id_test/.part-U_Courtyard_0.parquet.4242.tmp.parquet",
-    ):  # fmt: skip
-        (copy / left).parent.mkdir(parents=True, exist_ok=True)
-        (copy / left).write_bytes(b"half")
-    before = {p: p.stat().st_mtime_ns for p in copy.rglob("*.*") if "/." not in str(p)}
-    code, err = run(copy)
-    assert code == 0, err
-    assert err.count("; nothing to do; ") == 1, "what was asked for, not what it builds on"
-    assert {p: p.stat().st_mtime_ns for p in before} == before, "nothing changed, nothing is written"
-    assert recording.is_dir()
-    assert not [p for p in copy.rglob(".*") if p.name != ".lock"]
-    (copy / "meshes" / ".mine.1.tmp").write_text("not looked for again")
-    code, err = run(copy)
-    assert (copy / "meshes" / ".mine.1.tmp").is_file()

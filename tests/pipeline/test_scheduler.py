@@ -10,13 +10,12 @@ from support.command_line import called
 
 from aerialdojo_gen.base.config.pipeline import load_pipeline
 from aerialdojo_gen.dataset.build import open_pipeline
-from aerialdojo_gen.pipeline.executors import make_executor
+from aerialdojo_gen.pipeline.executors.base import make_executor
 from aerialdojo_gen.pipeline.freshness import ShardFinder
 from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.pipeline.registry import BY_NAME, STAGES
 from aerialdojo_gen.pipeline.runner import group_stages
-from aerialdojo_gen.pipeline.runtime_estimate import RuntimeEstimate
-from aerialdojo_gen.pipeline.scheduler import SceneScheduler
+from aerialdojo_gen.pipeline.scheduler import RuntimeEstimate, SceneScheduler
 
 SCENES = ("U_Courtyard_0", "U_Courtyard_1")
 TABLES = {"pair-objects": "pairs", "plan": "plans", "filter": "verdicts"}
@@ -46,7 +45,7 @@ def test_a_process_takes_a_scene_through_the_stages(project, smoke, tmp_path, wo
     expected_s = known.left_s
     quiet = Reporter(quiet=True)
     finder = ShardFinder(config, roots, SCENES, quiet)
-    scheduler = SceneScheduler(stages, SCENES, finder, roots.data, quiet, known)
+    scheduler = SceneScheduler(stages, finder, known)
     with make_executor("local", workers) as pool:
         outcomes = list(pool.run(chores.compute_and_sign, scheduler))
     assert not scheduler.errors

@@ -1,10 +1,11 @@
-"""`status` says what a run would compute, and touches nothing."""
+"""`status` says what a run would compute, and touches nothing; a finished run is not computed again."""
 
 import json
 import shutil
 
+import pandas as pd
 import pytest
-from support.command_line import said
+from support.command_line import called, said
 
 from aerialdojo_gen import pipeline_status, run_pipeline
 
@@ -66,3 +67,24 @@ def test_nothing_is_there_yet(tmp_path, capsys):
     assert code == 0
     assert all(one["missing"] == [A, B] for one in json.loads(out))
     assert not (tmp_path / "none").exists()
+
+
+def test_render_command_keeps_to_the_pipelines_scenes(smoke, project):
+    before = {p: p.stat().st_mtime_ns for p in smoke.rglob("*.parquet")}
+    assert pd.read_parquet(smoke / "recordings")["ok"].all()
+    done = called("render", "--pipeline", "pipelines/smoke.toml", "--limit", 1, "--data", smoke, cwd=project)
+    assert done.returncode == 0, done.stderr
+    tasks = pd.read_parquet(smoke / "release/tasks")
+    trained = tasks[tasks["subset"] == "train"].groupby(["scene", "setting"]).ngroups
+    assert f"render: {trained} rows in, {8 * trained} out" in done.stderr
+    assert {p: p.stat().st_mtime_ns for p in smoke.rglob("*.parquet")} == before
+
+
+def test_a_run_prints_what_stats_prints(smoke, project):
+    def printed(*args):
+        done = called(*args, "--data", smoke, cwd=project)
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    assert printed("run", "pipelines/smoke.toml", "--stats") == printed("stats")
+    assert printed("run", "pipelines/smoke.toml") == ""

@@ -169,7 +169,7 @@ def test_who_lost_the_lock_writes_nothing_more(cloud: str):
                               cwd=os.path.dirname(os.path.dirname(__file__)), check=False)  # fmt: skip
         assert b"this run has lost the lock of" in done.stderr
         (lease,) = root._state.leases.values()
-        assert not lease._is_still_held()
+        lease._find_whose_it_is()
         write(root, "t/a/x", b"too late")
     assert open_root(cloud).local_copy("t/a/x").read_bytes() == b"mine"
 

@@ -1,4 +1,4 @@
-"""What is kept or read ahead of files is what they say: never of files that have changed, never in the way."""
+"""What is kept of files is what they say: never of files that have changed, never in the way."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import pytest
 
 from aerialdojo_gen.base.errors import StoreError
 from aerialdojo_gen.cli.app import app
-from aerialdojo_gen.store.files import file_digest, prefetch_files
-from aerialdojo_gen.store.memo import cache_text, is_cached, memo, memo_key
+from aerialdojo_gen.store.cache import cache_text, is_cached, memo, memo_key
+from aerialdojo_gen.store.files import file_digest
 from aerialdojo_gen.store.root import open_root
 
 pytestmark = pytest.mark.usefixtures("cache")
@@ -74,22 +74,10 @@ def test_stats_of_a_changed_release_are_its_own_and_a_truncated_part_is_told(smo
     assert "U_Courtyard_0" not in stats()
 
 
-def test_what_a_thread_reads_ahead_is_found(tmp_path):
-    paths = [tmp_path / str(k) for k in range(20)]
-    for k, path in enumerate(paths):
-        path.write_bytes(os.urandom(k * 700_000))
-    prefetch_files([*paths, tmp_path / "none"])
-    prefetch_files(paths)
-    for path in paths:
-        assert file_digest(path) == hashlib.sha256(path.read_bytes()).hexdigest()
-    with pytest.raises(FileNotFoundError):
-        file_digest(tmp_path / "none")
-
-
 def test_a_file_that_was_changed_since_is_read_again(tmp_path):
     path = tmp_path / "a"
     path.write_bytes(b"one")
-    prefetch_files([path])
+    assert file_digest(path) == hashlib.sha256(b"one").hexdigest()
     before = path.stat()
     path.write_bytes(b"two")
     os.utime(path, ns=(before.st_atime_ns, before.st_mtime_ns))

@@ -10,8 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from aerialdojo_gen.base.errors import AssetError
-from aerialdojo_gen.pipeline.executors.base import TaskQueue
-from aerialdojo_gen.pipeline.executors.channels import at_end
+from aerialdojo_gen.pipeline.executors.base import TaskQueue, at_end
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,7 @@ from aerialdojo_gen.geometry.frames import wrap_angle_rad, yaw_towards
 from aerialdojo_gen.geometry.part_visibility import FRONT_RAD
 from aerialdojo_gen.geometry.surface import Surface
 from aerialdojo_gen.pipeline.scoring.ensemble import SCORERS
-from aerialdojo_gen.pipeline.scoring.geometric import FACTORS, WEIGHTS
-from aerialdojo_gen.pipeline.scoring.recognisability import FRONT_WEIGHT, PARTS_WEIGHT, clarity_score
+from aerialdojo_gen.pipeline.scoring.geometric import FACTORS, FRONT_WEIGHT, PARTS_WEIGHT, WEIGHTS, clarity_score
 from aerialdojo_gen.pipeline.stages.work.anchor_choice import SLACK_M
 
 _SAME_M = 1e-4

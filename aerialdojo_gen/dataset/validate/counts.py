@@ -58,7 +58,7 @@ def scene_counts(data: SceneData, counts: SceneCounts) -> Outcome:
     if not counts.complete:
         outcome.skipped = "the scene cannot be read"
         return outcome
-    from aerialdojo_gen.pipeline.stages.work.quota import train_quotas
+    from aerialdojo_gen.pipeline.stages.work.candidate_policy import train_quotas
 
     trains = train_quotas(data.scene, inventory(), splits())
     side = store.partition(data.scene)

@@ -14,7 +14,7 @@ from aerialdojo_gen.geometry.motion import DISPLACEMENTS, replay
 from aerialdojo_gen.geometry.rays import instance_caster
 from aerialdojo_gen.pipeline.stages.work.pair_objects import surface_points
 from aerialdojo_gen.pipeline.stages.work.rules import settings_of
-from aerialdojo_gen.pipeline.stages.work.task_ids import held_out, key_of, nav_id
+from aerialdojo_gen.pipeline.stages.work.split import held_out, key_of, nav_id
 from aerialdojo_gen.store.schemas import APPROACH, DIFFICULTY_COLUMNS, SETTINGS, SPLIT_COLUMNS, STOP, VIEWS
 
 # Shapes of imported meshes have no digest: `task_goal` compares that column, null or not.

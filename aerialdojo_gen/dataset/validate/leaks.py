@@ -28,7 +28,7 @@ from aerialdojo_gen.dataset.validate.rows import (
     pairs_of,
     repeated,
 )
-from aerialdojo_gen.pipeline.stages.work.task_ids import key_of, nav_id, reference_id
+from aerialdojo_gen.pipeline.stages.work.split import key_of, nav_id, reference_id
 
 _SAME_M = 1e-9
 # Digits with a decimal point: no description of the project's has any, a coordinate always does.

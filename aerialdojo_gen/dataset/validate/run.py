@@ -17,7 +17,7 @@ from aerialdojo_gen.dataset.validate.parts import Release, foreign_files, part_p
 from aerialdojo_gen.dataset.validate.registry import CHECKS, TABLES, Outcome, ordered, run_checks
 from aerialdojo_gen.dataset.validate.report import Report
 from aerialdojo_gen.dataset.validate.rows import SceneData
-from aerialdojo_gen.pipeline.executors import SharedPaths, make_executor, on_disk
+from aerialdojo_gen.pipeline.executors.base import SharedPaths, make_executor, on_disk
 from aerialdojo_gen.pipeline.interrupt import Interrupts
 from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.store.root import Where

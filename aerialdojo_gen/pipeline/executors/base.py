@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import time
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
@@ -11,8 +13,52 @@ from types import TracebackType
 from typing import Any, Generic, Protocol, TypeVar
 
 from aerialdojo_gen.base.errors import AerialDojoError, UsageError
-from aerialdojo_gen.pipeline.executors.channels import RateLimiter, WorkerChannel
 from aerialdojo_gen.store.root import DataRoot, LocalRoot
+
+
+class WorkerChannel(Protocol):
+    """A worker's channel to its parent."""
+
+    every_s: float  # Least interval of messages, seconds; 0 if they are free
+
+    def send(self, message: object) -> None:
+        """Send a small message to the parent while the task runs."""
+
+    def stopped(self) -> bool:
+        """Whether the parent has asked to start nothing more."""
+
+    def turn(self, interval_s: float) -> float:
+        """Return how many seconds to wait; turns of all workers are at least `interval_s` apart."""
+
+
+class RateLimiter:
+    """Gives out turns at even intervals."""
+
+    def __init__(self) -> None:
+        self._next = 0.0
+
+    def take(self, interval_s: float) -> float:
+        """Return how many seconds to wait for the next turn."""
+        now = time.monotonic()
+        at = max(now, self._next)
+        self._next = at + interval_s
+        return at - now
+
+
+_closers: list[Callable[[], object]] = []
+
+
+def at_end(close: Callable[[], object]) -> None:
+    """Register a callback for the end of this process's work for its executor."""
+    _closers.append(close)
+
+
+def end() -> None:
+    """Call the registered callbacks, the last first; their errors are ignored."""
+    while _closers:
+        with contextlib.suppress(Exception):
+            _closers.pop()()
+
 
 EXECUTORS = ("local", "ray")
 
@@ -170,13 +216,6 @@ class TaskQueue(Generic[T]):
             scene = max(names, key=self._weight)
         self._at[lane] = scene
         return self._pop(scene)
-
-    def one_by_one(self) -> Iterator[T]:
-        """Yield all tasks for a single process, scene by scene."""
-        scene = ""
-        while self._scenes:
-            scene = scene if scene in self._scenes else next(iter(self._scenes))
-            yield self._pop(scene)
 
     def on_done(self, task: T, outcome: Any) -> None:
         """Record a task's result or expected error."""

@@ -21,8 +21,7 @@ from typing import Any
 
 from aerialdojo_gen.base import memory
 from aerialdojo_gen.base.errors import AerialDojoError
-from aerialdojo_gen.pipeline.executors.base import Executor, R, T, TaskQueue, guarded
-from aerialdojo_gen.pipeline.executors.channels import end
+from aerialdojo_gen.pipeline.executors.base import Executor, R, T, TaskQueue, end, guarded
 
 # How often the parent checks whether workers must stop, seconds.
 _POLL_S = 0.2
@@ -84,7 +83,7 @@ class LocalExecutor(Executor):
         """Run tasks and yield results or expected errors in completion order."""
         channel = waiting.channel
         if self._workers <= 1 or waiting.alone:
-            for task in waiting.one_by_one():
+            while (task := waiting.take(0)) is not None:
                 outcome = guarded(work, task, channel)
                 waiting.on_done(task, outcome)
                 yield outcome

@@ -13,9 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from aerialdojo_gen.base import memory
-from aerialdojo_gen.pipeline.executors.base import guarded
+from aerialdojo_gen.pipeline.executors.base import RateLimiter, end, guarded
 from aerialdojo_gen.pipeline.executors.bundled import Unpacked
-from aerialdojo_gen.pipeline.executors.channels import RateLimiter, end
 
 _POLL_EVERY_S = 0.5
 

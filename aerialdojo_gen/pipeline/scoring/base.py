@@ -41,7 +41,7 @@ class AnchorView:
     visible: NDArray[np.bool_]  # (H, W) bool; pixels that show the object
     alone: NDArray[np.bool_]  # Pixels that would show it if nothing else were there; a superset of `visible`
     sky: NDArray[np.bool_]  # (H, W) bool; pixels that show no surface at all
-    known: CandidateMeasures
+    measures: CandidateMeasures
     nearer: NDArray[np.bool_] | None = None  # (H, W) bool or None
     behind: AnchorView | None = None
 
@@ -78,7 +78,7 @@ class AnchorView:
             "centred": 1.0 - min(float(away), 1.0),
             "contrast": contrast,
             "sky": sky,
-            "framed": self.known.framed,
+            "framed": self.measures.framed,
             "open": 1.0 - foreground,
         }
 

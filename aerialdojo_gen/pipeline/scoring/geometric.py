@@ -1,4 +1,7 @@
-"""The default scorer: the paper's "visual informativeness", made explicit from the instance mask of the picture."""
+"""The default scorer: the paper's "visual informativeness", made explicit from the instance mask of the picture.
+
+Where a thing has a front or parts that make its name true, how well these are seen counts beside its silhouette.
+"""
 
 from __future__ import annotations
 
@@ -7,10 +10,12 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from aerialdojo_gen.geometry.viewpoints import level_marks
 from aerialdojo_gen.pipeline.scoring.base import AnchorView, CandidateMeasures
-from aerialdojo_gen.pipeline.scoring.recognisability import clarity_score, front_score, part_score, recognisability
+
+Floats = NDArray[np.float64]
 
 WEIGHTS = {
     "unoccluded": 0.25, "shown": 0.25, "size": 0.1, "centred": 0.1, "contrast": 0.05, "sky": 0.025, "level": 0.1,
@@ -18,10 +23,43 @@ WEIGHTS = {
 }  # fmt: skip
 # The weighted mean is multiplied by the `clarity_score` of these, of `unoccluded` and of `level`.
 FACTORS = ("framed", "open")
+PARTS_WEIGHT, FRONT_WEIGHT = 0.35, 0.3
+_ANGLES_RAD, _MARKS = np.radians([0.0, 25.0, 60.0, 60.001, 120.0]), (1.0, 1.0, 0.5, 0.15, 0.0)
 # Share of the reference picture in a term, if it is taken from further back.
 _BEHIND = 0.7
 # Above the rounding error of a score.
 _ROUNDING = 1e-9
+
+
+def part_score(part_visibility: Floats) -> Floats:
+    """Score how well identifying parts (…, t), 0 to 1, are seen: half the worst one, half their mean."""
+    return np.asarray((part_visibility.min(axis=-1) + part_visibility.mean(axis=-1)) / 2.0)
+
+
+def front_score(off_front_rad: ArrayLike | None) -> Floats | None:
+    """Mark angles off the front: full up to 25°, half at 60°, little beyond; None for an object without a front."""
+    return None if off_front_rad is None else _interpolate(off_front_rad, _ANGLES_RAD, _MARKS)
+
+
+def clarity_score(unoccluded: ArrayLike, framed: ArrayLike, foreground: ArrayLike, level: ArrayLike) -> Floats:
+    """Factor in (0, 1] for what hides the object, cuts it off or stands nearer, and for looking up or down."""
+    return np.asarray(
+        _interpolate(unoccluded, (0.4, 0.95), (0.4, 1.0))
+        * _interpolate(framed, (0.5, 0.98), (0.6, 1.0))
+        * _interpolate(foreground, (0.05, 0.5), (1.0, 0.5))
+        * _interpolate(level, (0.0, 1.0), (0.7, 1.0))
+    )
+
+
+def _interpolate(value: ArrayLike, at: ArrayLike, marks: ArrayLike) -> Floats:
+    return np.asarray(np.interp(np.asarray(value), np.asarray(at), np.asarray(marks)))
+
+
+def recognisability(score: ArrayLike, parts: ArrayLike | None, front: ArrayLike | None) -> Floats:
+    """Combine the silhouette's score with those of parts and front; None leaves its weight to the first."""
+    known = [(w, np.asarray(mark)) for w, mark in ((PARTS_WEIGHT, parts), (FRONT_WEIGHT, front)) if mark is not None]
+    rest = 1.0 - sum(weight for weight, _ in known)
+    return np.asarray(rest * np.asarray(score) + sum(weight * mark for weight, mark in known))
 
 
 @dataclass(frozen=True)
@@ -44,11 +82,9 @@ class Parts:
     @property
     def score(self) -> float:
         """The weighted mean of the terms, times what the picture is worth for what hides or cuts off the object."""
-        marks = asdict(self)
-        silhouette = sum(weight * marks[name] for name, weight in WEIGHTS.items())
-        known = [None if mark is None else np.array([mark]) for mark in (self.tells, self.front)]
-        clear = clarity_score(*np.array([[self.unoccluded], [self.framed], [1.0 - self.open], [self.level]]))
-        return float((recognisability(np.array([silhouette]), *known) * clear)[0])
+        silhouette = sum(weight * getattr(self, name) for name, weight in WEIGHTS.items())
+        clear = clarity_score(self.unoccluded, self.framed, 1.0 - self.open, self.level)
+        return float(recognisability(silhouette, self.tells, self.front) * clear)
 
     @property
     def columns(self) -> dict[str, float | None]:
@@ -61,32 +97,34 @@ def judge(view: AnchorView, radius_m: float, standoff_m: float) -> Parts:
     marks = view.marks
     if view.behind is not None:
         marks = {name: _mixed(term, view.behind.marks[name]) for name, term in marks.items()}
-    return _parts(view.known, marks, radius_m, standoff_m)
+    return _parts(view.measures, marks, radius_m, standoff_m)
 
 
-def most(known: CandidateMeasures, radius_m: float, standoff_m: float, behind: AnchorView | None = None) -> float:
+def score_bound(
+    measures: CandidateMeasures, radius_m: float, standoff_m: float, behind: AnchorView | None = None
+) -> float:
     """Bound the score of every picture from a viewpoint from above, by what is known of the viewpoint without one."""
     marks = dict.fromkeys(("unoccluded", "size", "centred", "contrast", "sky", "open"), 1.0)
-    marks["framed"] = known.framed
+    marks["framed"] = measures.framed
     if behind is not None:
         marks = {name: _mixed(term, behind.marks[name]) for name, term in marks.items()}
-    elif known.framed_behind is not None:
-        marks["framed"] = _mixed(known.framed, known.framed_behind)
-    return _parts(known, marks, radius_m, standoff_m).score + _ROUNDING
+    elif measures.framed_behind is not None:
+        marks["framed"] = _mixed(measures.framed, measures.framed_behind)
+    return _parts(measures, marks, radius_m, standoff_m).score + _ROUNDING
 
 
 def _mixed(here: float, behind: float) -> float:
     return (1.0 - _BEHIND) * here + _BEHIND * behind
 
 
-def _parts(known: CandidateMeasures, marks: dict[str, Any], radius_m: float, standoff_m: float) -> Parts:
+def _parts(measures: CandidateMeasures, marks: dict[str, Any], radius_m: float, standoff_m: float) -> Parts:
     room = standoff_m - radius_m
-    clear = min(max((known.clearance_m - radius_m) / room, 0.0), 1.0) if room > 0.0 else 1.0
-    tells = float(part_score(np.array([known.part_visibility]))[0]) if known.part_visibility else None
-    off = front_score(None if known.off_front_rad is None else np.array([known.off_front_rad]))
-    front = None if off is None else float(off[0])
-    level = float(level_marks(known.elevation_deg))
-    return Parts(shown=known.shown, level=level, clear=clear, tells=tells, front=front, **marks)
+    clear = min(max((measures.clearance_m - radius_m) / room, 0.0), 1.0) if room > 0.0 else 1.0
+    tells = float(part_score(np.array(measures.part_visibility))) if measures.part_visibility else None
+    off = front_score(measures.off_front_rad)
+    level = float(level_marks(measures.elevation_deg))
+    front = None if off is None else float(off)
+    return Parts(shown=measures.shown, level=level, clear=clear, tells=tells, front=front, **marks)
 
 
 class GeometricScorer:

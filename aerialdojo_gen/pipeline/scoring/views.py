@@ -36,7 +36,7 @@ def take_view(
     camera: Camera,
     position_m: Floats,
     yaw_rad: float,
-    known: CandidateMeasures,
+    measures: CandidateMeasures,
     parts: Sequence[NDArray[np.int64]],
 ) -> AnchorView:
     """Take an object's front view from a candidate anchor (world metres, radians), the same mask anywhere."""
@@ -48,16 +48,16 @@ def take_view(
     hidden = np.flatnonzero(~visible & (picture.instance >= 0) & boxed(camera, pose, thing.vertices))
     silhouette = visible.copy()
     directions = product(pixel_rays(camera)[0][hidden], pose[:3, :3].T)
-    if len(hidden):
-        silhouette.flat[hidden] = alone.first_hit(position_m, directions)[1] >= 0
+    silhouette.flat[hidden] = alone.first_hit(position_m, directions)[1] >= 0
     shares = part_shares(alone, thing, parts, camera, pose, visible)
     marks = tuple(
-        seen * min(1.0, math.sqrt(share / _LARGE)) for seen, share in zip(known.part_visibility, shares, strict=True)
+        seen * min(1.0, math.sqrt(share / _LARGE))
+        for seen, share in zip(measures.part_visibility, shares, strict=True)
     )
     wide = (picture.instance >= 0) & renderer.wide[picture.instance]
     nearer = standing_nearer(picture.depth_m, visible, wide, camera, pose)
-    known = replace(known, part_visibility=marks)
-    return AnchorView(picture.rgb, visible, silhouette, picture.instance < 0, known, nearer)
+    measures = replace(measures, part_visibility=marks)
+    return AnchorView(picture.rgb, visible, silhouette, picture.instance < 0, measures, nearer)
 
 
 def standing_nearer(
@@ -167,14 +167,18 @@ def part_shares(
     # A few pixels prove that a large part is shown; the others are tested for the rest alone.
     for some in (coarse, ~coarse):
         left = [k for k in range(len(parts)) if counts[k] < enough * visible.size]
-        pixels = np.flatnonzero(np.any([around[k] for k in left], axis=0) & some) if left else np.zeros(0, np.int64)
-        if not len(pixels):
-            continue
-        directions = product(pixel_rays(camera)[0][pixels], world_from_camera[:3, :3].T)
-        face = alone.first_hit(world_from_camera[:3, 3], directions)[1]
-        for k in left:
-            own = np.zeros(len(thing.faces) + 1, dtype=np.bool_)
-            own[parts[k]] = True
-            # The last one stands for -1: nothing is hit.
-            counts[k] += int(own[face].sum())
+        if left:
+            pixels = np.any([around[k] for k in left], axis=0) & some
+            shown = pixels_by_face(alone, len(thing.faces), camera, world_from_camera, pixels)
+            for k in left:
+                counts[k] += shown[parts[k]].sum()
     return [float(count) / visible.size for count in counts.tolist()]
+
+
+def pixels_by_face(
+    alone: TriangleRayCaster, faces: int, camera: Camera, world_from_camera: Floats, pixels: NDArray[np.bool_]
+) -> NDArray[np.int64]:
+    """How many of some pixels (H, W) that show an instance show each of its faces, (faces,) int64."""
+    directions = product(pixel_rays(camera)[0][pixels.ravel()], world_from_camera[:3, :3].T)
+    face = alone.first_hit(world_from_camera[:3, 3], directions)[1]
+    return np.bincount(face[face >= 0], minlength=faces)

@@ -1,1 +1,1 @@
-"""What stages do: `work`, a module each, imported when the stage runs; `hooks`, what they decide before."""
+"""What stages do: `work`, a module each, imported when the stage runs."""

@@ -101,10 +101,9 @@ class AnchorService:
         for row in self.candidates(entry):
             if is_same(row, pose):
                 return row, []
-        judged = self._run(
+        return self._run(
             lambda: judge_anchor(position_m, yaw, self._item(entry), self._world.result(), self._job, self.config)
         )
-        return judged.row, list(judged.faults)
 
     def view(self, position_m: Floats, yaw_rad: float) -> View:
         """Take the front view from a place (kept for the next time)."""

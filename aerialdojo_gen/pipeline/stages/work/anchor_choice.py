@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -30,18 +29,10 @@ SLACK_M = 0.5
 _SAME_M, _SAME_RAD = 2e-3, math.radians(0.02)
 
 
-@dataclass(frozen=True)
-class Judged:
-    """Result of the checks of a viewpoint."""
-
-    row: dict[str, Any]
-    faults: tuple[str, ...]  # Messages; empty if it is valid
-
-
 def judge_anchor(
     position_m: Floats, yaw_rad: float, item: dict[str, Any], world: World, job: Job, config: AnchorSampleConfig
-) -> Judged:
-    """Check a viewpoint (world metres, radians) against all rules for anchors (paper: anchors)."""
+) -> tuple[dict[str, Any], list[str]]:
+    """Check a viewpoint (world metres, radians) against all rules for anchors (paper: anchors): row, faults."""
     k = world.index[item["mesh_node"]]
     instance = world.scene.instances[k]
     surface = Surface.of(instance)
@@ -66,18 +57,18 @@ def judge_anchor(
         faults.append(f"it is too {side}: {distance:.2f} m from the object's surface, not about "
                       f"{config.standoff_m:g} m")  # fmt: skip
     points = surface.sample(config.surface_points, generator(job.seed, "anchor-sample", job.scene, item["object_id"]))
-    found = Candidates.of(world, k, points, place, np.array([yaw_rad]), radius, config)
-    seen = float(found.views.visible_fraction[0])
-    if seen <= 0 or seen < config.min_visible_fraction:
-        faults.append(f"it does not see the object: {seen:.0%} of what it faces, {config.min_visible_fraction:.0%} "
+    candidates = Candidates(world, k, points, place, np.array([yaw_rad]), radius, config)
+    share = float(candidates.views.visible_fraction[0])
+    if share <= 0 or share < config.min_visible_fraction:
+        faults.append(f"it does not see the object: {share:.0%} of what it faces, {config.min_visible_fraction:.0%} "
                       "is the least")  # fmt: skip
-    candidate_views = CandidateViews.of(found, np.zeros(1, np.int64), config)
-    (picture,) = candidate_views.pictures(np.zeros(1, np.int64), config.picture_px, config.fov_deg)
+    candidate_views = CandidateViews.of(candidates, np.zeros(1, np.int64))
+    picture = candidate_views.picture(0, config.picture_px)
     parts = judge(picture, radius, config.standoff_m)
     row = {
         "scene": job.scene,
         "object_id": item["object_id"],
-        **found.row(0, distance),
+        **candidates.row(0, distance),
         "no_front_reason": None,
         "step_back_m": float(candidate_views.step_back_m[0]),
         # The other scorers compare candidates; there is only one here.
@@ -86,7 +77,7 @@ def judge_anchor(
         **parts.columns,
         "thumbnail": picture.jpeg(),
     }
-    return Judged(row, tuple(faults))
+    return row, faults
 
 
 def with_choice(
@@ -103,13 +94,12 @@ def with_choice(
         first = same[0]
     else:
         position = np.array([choice["x_m"], choice["y_m"], choice["z_m"]])
-        judged = judge_anchor(position, choice["yaw_rad"], item, world, job, config)
-        if judged.faults:
+        first, faults = judge_anchor(position, choice["yaw_rad"], item, world, job, config)
+        if faults:
             raise AnnotationError(
                 f"{job.scene}: the anchor chosen for object {item['object_id']} ({item['name']}) will not do: "
-                f"{'; '.join(judged.faults)}. Choose another one: {command('annotate', scene=job.scene)}"
+                f"{'; '.join(faults)}. Choose another one: {command('annotate', scene=job.scene)}"
             )
-        first = judged.row
     ordered = [first, *(row for row in rows if row is not first)][: config.shortlist]
     return [
         row

@@ -61,15 +61,15 @@ def run(job: Job, config: AnchorSampleConfig) -> Output:
                 f"{job.scene}: object {item['object_id']} ({item['name']}) has the mesh node {item['mesh_node']!r}, "
                 f"which is not in the scene: run {command('annotate-import', scene=job.scene)}"
             )
-        found, rejected, seen = sampled(item, world, job, config)
+        anchors, rejected, seen = anchors_of(item, world, job, config)
         viewpoints += seen
         if item["object_id"] in chosen:
-            before = found
-            found = with_choice(before, chosen[item["object_id"]], item, world, job, config)
-            rejected["not_shortlisted"] += sum(all(row["x_m"] != f["x_m"] for f in found) for row in before)
-        rows += found
+            before = anchors
+            anchors = with_choice(before, chosen[item["object_id"]], item, world, job, config)
+            rejected["not_shortlisted"] += sum(all(row["x_m"] != f["x_m"] for f in anchors) for row in before)
+        rows += anchors
         counts += rejected
-        if not found:
+        if not anchors:
             bare += 1
             why = ", ".join(f"{reason} {n}" for reason, n in rejected.items() if n)
             log.warning("%s: object %d (%s) has no anchor: %s", job.scene, item["object_id"], item["name"], why)
@@ -84,63 +84,54 @@ def run(job: Job, config: AnchorSampleConfig) -> Output:
 
 def anchors_of(
     item: dict[str, Any], world: World, job: Job, config: AnchorSampleConfig
-) -> tuple[list[dict[str, Any]], Counter[str]]:
-    """Find one object's anchors."""
-    return sampled(item, world, job, config)[:2]
-
-
-def sampled(
-    item: dict[str, Any], world: World, job: Job, config: AnchorSampleConfig
 ) -> tuple[list[dict[str, Any]], Counter[str], list[dict[str, Any]]]:
-    """Find one object's anchors and viewpoints."""
-    found, rejected, nearly = candidates_of(item, world, job, config)
-    if found is None:
+    """Find one object's anchors, how many candidates each test rejects, and its viewpoints."""
+    candidates, rejected, nearly = candidates_of(item, world, job, config)
+    if candidates is None:
         return [], rejected, []
-    rows = shortlisted(item, found, nearly, world, job, config)
-    seen = found.seeing(config.min_visible_fraction)
-    rejected["not_visible"] += len(found.positions_m) - len(seen)
+    rows = shortlisted(item, candidates, nearly)
+    seen = candidates.seeing(config.min_visible_fraction)
+    rejected["not_visible"] += len(candidates.positions_m) - len(seen)
     rejected["not_shortlisted"] += len(seen) - len(rows)
-    return rows, rejected, found.viewpoints(seen, item["object_id"])
+    return rows, rejected, candidates.viewpoints(seen, item["object_id"])
 
 
-def shortlisted(
-    item: dict[str, Any], found: Candidates, nearly: Counter[str], world: World, job: Job, config: AnchorSampleConfig
-) -> list[dict[str, Any]]:
+def shortlisted(item: dict[str, Any], candidates: Candidates, nearly: Counter[str]) -> list[dict[str, Any]]:
     """Picture and score the best candidates of an object, and keep the best of those."""
-    radius = job.embodiment.radius_m
-    seen = found.seeing(config.min_visible_fraction)
-    away = found.positions_m - world.scene.instances[found.instance].centroid
+    scene, config = candidates.world.scene, candidates.config
+    seen = candidates.seeing(config.min_visible_fraction)
+    away = candidates.positions_m - scene.instances[candidates.instance].centroid
     azimuth = atan2(away[:, 1], away[:, 0])
-    front = found.before_front
+    front = candidates.before_front
     separation_rad = math.radians(config.separation_deg)
     pictured = max(config.pictured, config.shortlist)
     # Several a side: what stands before the object from one place does not from the next.
-    ray_cast = seen[np.argsort(-found.rank[seen], kind="stable")[: _RAY_CAST_FACTOR * pictured]]
-    of_sides = seen[shortlist(found.rank[seen], azimuth[seen], pictured, separation_rad, front[seen])]
-    candidate_views = CandidateViews.of(found, np.union1d(ray_cast, of_sides), config)
+    ray_cast = seen[np.argsort(-candidates.rank[seen], kind="stable")[: _RAY_CAST_FACTOR * pictured]]
+    of_sides = seen[shortlist(candidates.rank[seen], azimuth[seen], pictured, separation_rad, front[seen])]
+    candidate_views = CandidateViews.of(candidates, np.union1d(ray_cast, of_sides))
     of_ray_cast = shortlist(
         candidate_views.rank, azimuth[candidate_views.which], pictured, separation_rad, front[candidate_views.which]
     )
     few, backs = candidate_views.which[of_ray_cast], candidate_views.step_back_m[of_ray_cast].tolist()
-    best, shown = best_pictured(item["name"], candidate_views, of_ray_cast, azimuth[few], front[few], radius, config)
-    own_distance = Surface.of(world.scene.instances[found.instance]).distance_m(found.positions_m[few[best]])
+    best, shown = best_pictured(item["name"], candidate_views, of_ray_cast, azimuth[few], front[few])
+    own_distance = Surface.of(scene.instances[candidates.instance]).distance_m(candidates.positions_m[few[best]])
     why = None
     if len(best) and front[seen].any() and not front[few[best[0]]]:
         why = "better_elsewhere"
-    elif len(best) and found.off_front_rad is not None and not front[few[best[0]]]:
-        nearly["not_visible"] += int((found.off_front_rad <= FRONT_RAD).sum())
+    elif len(best) and candidates.off_front_rad is not None and not front[few[best[0]]]:
+        nearly["not_visible"] += int((candidates.off_front_rad <= FRONT_RAD).sum())
         why = max(sorted(nearly), key=lambda reason: nearly[reason]) if nearly.total() else "no_surface"
     return [
         {
-            "scene": job.scene,
+            "scene": scene.name,
             "object_id": item["object_id"],
             "anchor_id": rank,
-            **found.row(int(few[n]), float(own_distance[rank])),
+            **candidates.row(int(few[n]), float(own_distance[rank])),
             "step_back_m": backs[n],
             "no_front_reason": why if rank == 0 else None,
             "score": verdict.score,
             **verdict.parts,
-            **judge(picture, radius, config.standoff_m).columns,
+            **judge(picture, candidates.radius_m, config.standoff_m).columns,
             "thumbnail": picture.jpeg(),
             "selected": rank == 0,
             "selected_by": "auto",
@@ -187,5 +178,5 @@ def candidates_of(
         return None, rejected, nearly
     centroid = np.array([item["x_m"], item["y_m"], item["z_m"]])
     points = surface.sample(config.surface_points, generator(job.seed, "anchor-sample", job.scene, item["object_id"]))
-    found = Candidates.of(world, k, points, places, yaw_towards(places, centroid), radius, config)
-    return found, rejected, nearly
+    candidates = Candidates(world, k, points, places, yaw_towards(places, centroid), radius, config)
+    return candidates, rejected, nearly

@@ -18,7 +18,7 @@ from aerialdojo_gen.geometry.rays import RayCaster, TriangleRayCaster, instance_
 from aerialdojo_gen.geometry.surface import Surface
 from aerialdojo_gen.geometry.viewpoints import PointVisibility, Views, informativeness
 from aerialdojo_gen.pipeline.scoring.base import AnchorView, CandidateMeasures
-from aerialdojo_gen.pipeline.scoring.recognisability import front_score, part_score, recognisability
+from aerialdojo_gen.pipeline.scoring.geometric import front_score, part_score, recognisability
 from aerialdojo_gen.pipeline.scoring.views import take_view
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.rendering.casters import ray_caster
@@ -56,26 +56,24 @@ class Candidates:
 
     world: World
     instance: int  # The object's index in the scene
-    alone: TriangleRayCaster  # The object by itself
+    points: Floats  # (m, 3) float64; on the object's surface, metres, world frame
     positions_m: Floats  # (n, 3) float64; the body's centres, world frame
     yaw_rad: Floats  # (n,) float64
-    sight: PointVisibility  # Which points of the object's surface they see
-    points: Floats  # (m, 3) float64; on the object's surface, metres, world frame
     radius_m: float  # Of the body
-    standoff_m: float
-    fov_deg: float
+    config: AnchorSampleConfig
 
-    @classmethod
-    def of(
-        cls, world: World, instance: int, points: Floats, positions_m: Floats, yaw_rad: Floats, radius_m: float,
-        config: AnchorSampleConfig,
-    ) -> Candidates:  # fmt: skip
-        """Look from viewpoints (n, 3), world metres, with yaws at an object's points (m, 3) by ray casts."""
-        alone = instance_caster(world.scene.instances[instance])
-        sight = PointVisibility.of(positions_m, yaw_rad, points, alone, world.rays, instance, config.fov_deg)
-        return cls(
-            world, instance, alone, positions_m, yaw_rad, sight, points, radius_m, config.standoff_m, config.fov_deg
-        )
+    @cached_property
+    def alone(self) -> TriangleRayCaster:
+        """The object by itself."""
+        return instance_caster(self.world.scene.instances[self.instance])
+
+    @cached_property
+    def sight(self) -> PointVisibility:
+        """Which points of the object's surface they see."""
+        return PointVisibility.of(
+            self.positions_m, self.yaw_rad, self.points, self.alone, self.world.rays, self.instance,
+            self.config.fov_deg,
+        )  # fmt: skip
 
     @cached_property
     def clearance_m(self) -> Floats:
@@ -88,9 +86,9 @@ class Candidates:
         return patches_of(self.world, self.instance, self.points)
 
     @cached_property
-    def seen(self) -> Floats:
+    def part_shares(self) -> Floats:
         """Share that they see of each of those parts, (n, t) float64 (`part_visibility.visible_shares`)."""
-        return visible_shares(self.positions_m, self.yaw_rad, self.patches, self.world.rays, self.fov_deg)
+        return visible_shares(self.positions_m, self.yaw_rad, self.patches, self.world.rays, self.config.fov_deg)
 
     @cached_property
     def views(self) -> Views:
@@ -106,7 +104,7 @@ class Candidates:
     @cached_property
     def part_visibility(self) -> Floats:
         """How much of each identifying part they see beside the best of them, (n, t) float64."""
-        return np.asarray(self.seen / np.maximum(self.seen.max(axis=0, initial=0.0), 1e-9))
+        return np.asarray(self.part_shares / np.maximum(self.part_shares.max(axis=0, initial=0.0), 1e-9))
 
     @cached_property
     def off_front_rad(self) -> Floats | None:
@@ -119,23 +117,25 @@ class Candidates:
     @cached_property
     def rank(self) -> Floats:
         """Score of the ray casts alone, (n,) float64, which decides what is pictured at all."""
-        rank = informativeness(self.views, self.elevation_deg, self.clearance_m, self.radius_m, self.standoff_m)
+        rank = informativeness(
+            self.views, self.elevation_deg, self.clearance_m, self.radius_m, self.config.standoff_m
+        )
         parts = part_score(self.part_visibility) if self.part_visibility.shape[1] else None
         return recognisability(rank, parts, front_score(self.off_front_rad))
 
     def moved(self, which: NDArray[np.int64], positions_m: Floats) -> Candidates:
         """Look from other places (k, 3), facing the same way; places that stay are not looked from again."""
-        world, yaws = self.world, self.yaw_rad[which]
         new = np.flatnonzero((positions_m != self.positions_m[which]).any(axis=1))
-        places, turned = positions_m[new], yaws[new]
-        sight = PointVisibility.of(places, turned, self.points, self.alone, world.rays, self.instance, self.fov_deg)
-        clearance, seen = self.clearance_m[which], self.seen[which]
-        clearance[new] = world.free.distance_m(places)
-        seen[new] = visible_shares(places, turned, self.patches, world.rays, self.fov_deg)
-        found = replace(self, positions_m=positions_m, yaw_rad=yaws, sight=self.sight.with_rows(which, new, sight))
+        moved = replace(self, positions_m=positions_m, yaw_rad=self.yaw_rad[which])
+        away = replace(self, positions_m=positions_m[new], yaw_rad=moved.yaw_rad[new])
+        for one in moved, away:
+            vars(one).update(alone=self.alone, patches=self.patches)
+        clearance, shares = self.clearance_m[which], self.part_shares[which]
+        clearance[new], shares[new] = away.clearance_m, away.part_shares
         # What is measured already need not be when it is first needed.
-        vars(found).update(clearance_m=clearance, patches=self.patches, seen=seen)
-        return found
+        sight = self.sight.with_rows(which, new, away.sight)
+        vars(moved).update(clearance_m=clearance, part_shares=shares, sight=sight)
+        return moved
 
     def seeing(self, least: float) -> NDArray[np.int64]:
         """Numbers of the viewpoints that see at least so large a fraction of what faces them, and anything at all."""
@@ -166,9 +166,9 @@ class Candidates:
             None if self.off_front_rad is None else float(self.off_front_rad[k]), float(self.views.framed[k]),
         )  # fmt: skip
 
-    def picture(self, k: int, size_px: int, fov_deg: float) -> AnchorView:
+    def picture(self, k: int, size_px: int) -> AnchorView:
         """Take the front view from the k-th viewpoint."""
-        thing, camera = self.world.scene.instances[self.instance], Camera(size_px, size_px, fov_deg)
+        thing, camera = self.world.scene.instances[self.instance], Camera(size_px, size_px, self.config.fov_deg)
         return take_view(
             ray_renderer(self.world.scene), self.alone, thing, self.instance, camera, self.positions_m[k],
             float(self.yaw_rad[k]), self.measures(k), part_faces(thing),

@@ -14,7 +14,7 @@ from aerialdojo_gen.base.pictures import REFERENCE_PNG, encode_png
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.geometry.portable import product
 from aerialdojo_gen.geometry.rays import RayCaster, TriangleRayCaster, instance_caster
-from aerialdojo_gen.pipeline.scoring.views import box_px, boxed, part_shares
+from aerialdojo_gen.pipeline.scoring.views import box_px, boxed, part_shares, pixels_by_face
 from aerialdojo_gen.pipeline.stage import Job, Output
 from aerialdojo_gen.rendering.backend import scene_renderer
 from aerialdojo_gen.rendering.casters import ray_caster
@@ -97,24 +97,16 @@ def _parts_shown(
     assert thing.anatomy is not None
     some = np.zeros_like(mask)
     some[::_SOME_PX, ::_SOME_PX] = True
-    seen = _seen_faces(alone, len(thing.faces), camera, pose, mask & some)
+    seen = pixels_by_face(alone, len(thing.faces), camera, pose, mask & some)
     if not np.allclose(pose, at_anchor):
         pixels = np.flatnonzero(boxed(camera, at_anchor, thing.vertices) & some)
         directions = product(pixel_rays(camera)[0][pixels], at_anchor[:3, :3].T)
         own = np.zeros_like(mask)
         own.flat[pixels] = rays.first_hit(at_anchor[:3, 3], directions)[1] == k
-        seen = np.stack([seen, _seen_faces(alone, len(thing.faces), camera, at_anchor, own)])
+        seen = np.stack([seen, pixels_by_face(alone, len(thing.faces), camera, at_anchor, own)])
     least = MIN_SHARE * mask.size / _SOME_PX**2
     names = sorted(thing.anatomy.runs)
     return [name for name in names if (seen[..., thing.faces_of(name)].sum(axis=-1) >= least).all()]
-
-
-def _seen_faces(
-    alone: TriangleRayCaster, faces: int, camera: Camera, pose: NDArray[np.float64], pixels: NDArray[np.bool_]
-) -> NDArray[np.int64]:
-    """How many of some pixels (H, W) that show an instance show each of its faces, (faces,) int64."""
-    hit = alone.first_hit(pose[:3, 3], product(pixel_rays(camera)[0][pixels.ravel()], pose[:3, :3].T))[1]
-    return np.bincount(hit[hit >= 0], minlength=faces)
 
 
 def missing_parts(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -13,15 +15,47 @@ from aerialdojo_gen.annotations.language.sides import described, of_side
 from aerialdojo_gen.base.config.sections import SplitConfig
 from aerialdojo_gen.base.rng import rank
 from aerialdojo_gen.pipeline.stage import Job, Output
-from aerialdojo_gen.pipeline.stages.work.candidate_policy import policy_of
-from aerialdojo_gen.pipeline.stages.work.quota import Accepted, difficulty_level, sampling_key, train_mask
-from aerialdojo_gen.pipeline.stages.work.task_ids import held_out, key_of, nav_id, reference_id
+from aerialdojo_gen.pipeline.stages.work.candidate_policy import (
+    Accepted,
+    difficulty_level,
+    policy_of,
+    sampling_key,
+    train_mask,
+)
 from aerialdojo_gen.scenes.worlds.world import is_world, world_of
 from aerialdojo_gen.store.schemas import RELEASE_ANCHORS, RELEASE_OBJECTS, ROUTES, TASKS
 from aerialdojo_gen.store.schemas.columns import DIFFICULTY, START_VIEW
 
 _POSE = ("x_m", "y_m", "z_m", "yaw_rad")
 _LISTS = (*_POSE, "action", "agent_action")
+# 48 bits: two of the paper's 102,866 tasks collide once in 50,000 salts, which split reports.
+_DIGEST_BYTES = 6
+
+
+def key_of(salt: str | None, seed: int) -> bytes:
+    """The key (32 bytes) of a release's ids; it is never stored."""
+    text = f"seed {seed}" if salt is None else f"salt {salt}"
+    return hashlib.blake2b(text.encode(), digest_size=32, person=b"aerialdojo-ids").digest()
+
+
+def nav_id(scene: str, pair_id: str, key: bytes) -> str:
+    """Id of a navigation task, which does not reveal the target as the pair's id does."""
+    return f"{scene}-{_hex(f'{scene}/{pair_id}', key, b'nav')}"
+
+
+def reference_id(scene: str, object_id: int, key: bytes) -> str:
+    """Id of an object's picture, which does not reveal the object: ``ref_`` and 12 hexadecimal digits."""
+    return "ref_" + _hex(f"{scene}/{object_id}", key, b"reference")
+
+
+def held_out(scene: str, object_ids: Sequence[int], fraction: float, key: bytes) -> set[int]:
+    """Choose a scene's objects that the split by objects holds out."""
+    place = sorted(object_ids, key=lambda k: (_hex(f"{scene}/{k}", key, b"held out"), k))
+    return set(place[: int(fraction * len(place) + 0.5)])
+
+
+def _hex(text: str, key: bytes, kind: bytes) -> str:
+    return hashlib.blake2b(text.encode(), digest_size=_DIGEST_BYTES, key=key, person=kind).hexdigest()
 
 
 def _train_fraction(scene: str, out_of_distribution: bool, config: SplitConfig) -> float:
