@@ -12,7 +12,7 @@ import pytest
 from support.planting import PlantedFault, add, changed, check, definitions, named, outcome_of, plant, put, scene_data
 
 from aerialdojo_gen.dataset.validate import ValidationOptions, validate
-from aerialdojo_gen.dataset.validate.contact import thing_hovers
+from aerialdojo_gen.dataset.validate.meshes import thing_hovers
 
 OBJECTS, SCENES, LANDMARKS = "release/objects", "release/scenes", "release/landmarks"
 ANCHORS, VIEWPOINTS = "release/anchors", "release/viewpoints"

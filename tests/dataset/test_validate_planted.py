@@ -56,7 +56,8 @@ def patched(picture):
 def test_pictures_swapped_or_copied(planted, renderer):
     """By the renderer that drew them, and by another one; of four pictures, one is its own."""
     rows = planted.rows(OBJECTS)
-    four = scene_data(planted, pictures=4).sampled_objects
+    data = scene_data(planted, pictures=4)
+    four = data.sampled(data["objects"])
     pictures = [rows[row]["reference_image"] for row in four]
     swapped = {0: 1, 1: 0, 2: 0}
     for mine, other in swapped.items():

@@ -17,7 +17,7 @@ from support.planting import (
     turned,
 )
 
-from aerialdojo_gen.dataset.validate import collisions, oracle
+from aerialdojo_gen.dataset.validate import flights
 from aerialdojo_gen.dataset.validate.detours import _pieces
 from aerialdojo_gen.dataset.validate.registry import ALWAYS_AFTER, TABLES
 from aerialdojo_gen.dataset.validate.run import SCENE_CHECKS
@@ -191,7 +191,7 @@ def test_a_wall_across_any_one_leg_of_any_route_is_found(planted, world):
             joints[named(KEY, rows[k])] = joint
         planted.write(part, rows)
     data = scene_data(planted)
-    found = {data["routes"].key(f.row): f.found for f in collisions.route_collision(data, data["routes"])}
+    found = {data["routes"].key(f.row): f.found for f in flights.route_collision(data, data["routes"])}
     told = {name: [", ".join(f"{v:.2f}" for v in end) for end in joint] for name, joint in joints.items()}
     assert found == {name: f"the body touches a surface between ({p}) and ({q}) m" for name, (p, q) in told.items()}
 
@@ -228,9 +228,9 @@ def test_replayed_actions_are_swept_for_themselves(planted, world):
 
     row = planted.edit(KEY, change, hits)
     data = scene_data(planted)
-    found = [data["routes"].key(f.row) for f in collisions.replay_collision(data, data["routes"])]
+    found = [data["routes"].key(f.row) for f in flights.replay_collision(data, data["routes"])]
     assert found == [named(KEY, row)]
-    assert not list(collisions.route_collision(data, data["routes"]))
+    assert not list(flights.route_collision(data, data["routes"]))
 
 
 @pytest.mark.parametrize(
@@ -256,7 +256,7 @@ def test_the_oracle_says_what_a_flight_lacks(planted, world, key, change, words)
     nav_ids = {row["nav_id"] for row in planted.rows(KEY) if wanted(row)}
     row = planted.edit(key, change, wanted if key == KEY else first_instance)
     data = scene_data(planted)
-    found = {data["routes"].key(fault.row): fault.found for fault in oracle.oracle_fails(data, data["routes"])}
+    found = {data["routes"].key(fault.row): fault.found for fault in flights.oracle_fails(data, data["routes"])}
     assert list(found) == [f"nav_id={row['nav_id']}"]
     assert words in found[f"nav_id={row['nav_id']}"]
 
@@ -301,10 +301,13 @@ def test_pieces_are_the_shortest_that_are_worth_it(planted):
 
 
 def test_a_sample_asks_fcl_about_so_many_routes_and_always_the_same(planted):
-    asked = scene_data(planted, sample=5).sampled
-    assert len(asked) == 5
-    assert (asked == scene_data(planted, sample=5).sampled).all()
-    assert len(scene_data(planted).sampled) == len(planted.rows(KEY)) + len(planted.rows("routes/test"))
+    def sampled(most):
+        data = scene_data(planted, sample=most)
+        return data.sampled(data["routes"]).tolist()
+
+    assert len(sampled(5)) == 5
+    assert sampled(5) == sampled(5)
+    assert len(sampled(None)) == len(planted.rows(KEY)) + len(planted.rows("routes/test"))
 
 
 def test_checks_stand_after_those_that_they_build_on():

@@ -6,7 +6,6 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from aerialdojo_gen.dataset.validate.foreign_keys import comparable
 from aerialdojo_gen.dataset.validate.registry import Finding, check
 from aerialdojo_gen.dataset.validate.rows import Floats, Ints, Rows, SceneData, at
 from aerialdojo_gen.geometry.frames import wrap_angle_rad, yaw_towards
@@ -165,7 +164,7 @@ def anchor_yaw(data: SceneData, rows: Rows) -> Iterator[Finding]:
     item, own = data.objects_of(rows), rows.floats("yaw_rad")
     centre = at(data["objects"].floats("x_m", "y_m", "z_m").reshape(-1, 3), item)
     yaw = yaw_towards(rows.floats("x_m", "y_m", "z_m"), centre)
-    fit = comparable(data, "objects", item) & (rows.texts("selected_by") != "annotation")
+    fit = data.comparable("objects", item) & (rows.texts("selected_by") != "annotation")
     for row in np.flatnonzero(fit & (np.abs(wrap_angle_rad(own - yaw)) > _SAME_RAD)):
         yield Finding(int(row), f"{own[row]:.6f} rad", f"{yaw[row]:.6f} rad")
 

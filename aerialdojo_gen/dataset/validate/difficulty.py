@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 
 from aerialdojo_gen.dataset.validate.registry import Finding, check
-from aerialdojo_gen.dataset.validate.rows import Floats, Mask, Rows, SceneData, UncheckedError, at, pairs_of
+from aerialdojo_gen.dataset.validate.rows import Floats, Mask, Rows, SceneData, UncheckedError, at
 from aerialdojo_gen.geometry.cameras import Camera, project, view_pose
 from aerialdojo_gen.geometry.motion import DISPLACEMENTS, replay
 from aerialdojo_gen.geometry.rays import instance_caster
@@ -123,7 +123,7 @@ def straight_line(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """`straight_line_free` is true where the body's sweep from start to goal touches nothing, else false."""
     world, radius = data.world, data.pipeline.embodiment.radius_m
     paths, stored = data.paths, rows.floats("straight_line_free")
-    for row in data.sampled_routes(*_OF_ROUTE):
+    for row in data.sampled(rows).tolist():
         if not np.isfinite(stored[row]):
             continue
         start, goal = paths.starts[row, :3], paths.ends[row, :3]
@@ -140,7 +140,7 @@ def start_view(data: SceneData, rows: Rows) -> Iterator[Finding]:
     nodes, ids = data["objects"].texts("mesh_node"), data["objects"].ints("object_id").tolist()
     stored, views = rows.floats("target_visible_at_start"), rows.texts("visible_view_at_start")
     of_target: dict[int, list[int]] = {}
-    for row in data.sampled_routes(*_OF_ROUTE):
+    for row in data.sampled(rows).tolist():
         if np.isfinite(stored[row]):
             of_target.setdefault(int(data.target_of_route[row]), []).append(row)
     for target, routes in of_target.items():
@@ -253,7 +253,7 @@ def split_by_objects(data: SceneData, rows: Rows) -> Iterator[Finding]:
 def _has_salt(data: SceneData, key: bytes) -> bool:
     """Whether the release's ids were made with a key, by one of them."""
     routes = data["routes"]
-    return [nav_id(data.scene, pair, key) for pair in pairs_of(routes)[:1]] == routes.texts("nav_id")[:1].tolist()
+    return [nav_id(data.scene, pair, key) for pair in routes.pairs()[:1]] == routes.texts("nav_id")[:1].tolist()
 
 
 @check("tasks")

@@ -8,7 +8,6 @@ from collections.abc import Iterator
 import numpy as np
 
 from aerialdojo_gen.base.constants import NEAR_GOAL_M
-from aerialdojo_gen.dataset.validate.foreign_keys import comparable
 from aerialdojo_gen.dataset.validate.registry import Finding, check
 from aerialdojo_gen.dataset.validate.rows import (
     POSE,
@@ -19,7 +18,6 @@ from aerialdojo_gen.dataset.validate.rows import (
     SceneData,
     UncheckedError,
     at,
-    list_lengths,
     place_text,
     pose_text,
 )
@@ -36,7 +34,7 @@ _REPLAY = 1e-5
 @check("routes")
 def list_lengths_differ(_data: SceneData, rows: Rows) -> Iterator[Finding]:
     """The five lists of a route are of equal length, two poses at least."""
-    lengths = list_lengths(rows)
+    lengths = rows.list_lengths()
     for row in np.flatnonzero((lengths != lengths[:, :1]).any(axis=1) | (lengths[:, 0] < 2)):
         yield Finding(int(row), f"lists of {', '.join(str(n) for n in lengths[row])}", "one length, 2 or more")
 
@@ -47,7 +45,8 @@ def action_order(data: SceneData, _rows: Rows) -> Iterator[Finding]:
     for row in np.flatnonzero(data.paths.fit).tolist():
         actions = data.paths.action[data.paths.of(row)]
         if actions[-1] != STOP or (actions[:-1] <= STOP).any() or (actions > APPROACH).any():
-            yield Finding(row, f"actions {_some(actions)}", "Stop (0) at the last pose alone")
+            shown = actions.tolist() if len(actions) <= 8 else f"[… {', '.join(map(str, actions[-8:]))}]"
+            yield Finding(row, f"actions {shown}", "Stop (0) at the last pose alone")
         elif (actions[:-2] == APPROACH).any():
             yield Finding(row, f"Approach at pose {int(np.flatnonzero(actions == APPROACH)[0])}", "the last but one")
 
@@ -107,7 +106,8 @@ def out_of_bounds(data: SceneData, _rows: Rows) -> Iterator[Finding]:
     low, high = (scenes.floats(*(f"{e}_{a}_m" for a in "xyz"))[0] for e in ("min", "max"))
     outside = ((paths.xyz < low + radius - _LENGTH_M) | (paths.xyz > high - radius + _LENGTH_M)).any(axis=1)
     poses = np.flatnonzero(outside)
-    box = f"{radius:g} m inside {_corner(low)} to {_corner(high)}"
+    corners = ["(" + ", ".join(f"{v:g}" for v in corner.tolist()) + ") m" for corner in (low, high)]
+    box = f"{radius:g} m inside {corners[0]} to {corners[1]}"
     for row, first in zip(*np.unique(paths.route_of(poses), return_index=True), strict=True):
         pose = poses[first]
         yield Finding(int(row), f"pose {pose - paths.first[row]} at {place_text(paths.xyz[pose])}", box)
@@ -130,15 +130,6 @@ def _judged(data: SceneData, rows: Rows) -> tuple[np.ndarray, np.ndarray, Floats
 def _differs(stored: Floats, computed: Floats, unit: str) -> Iterator[Finding]:
     for row in np.flatnonzero(~(np.abs(stored - computed) <= _LENGTH_M)).tolist():
         yield Finding(row, f"{stored[row]:.9g}{unit}", f"{computed[row]:.9g}{unit}")
-
-
-def _some(actions: np.ndarray) -> str:
-    shown = actions.tolist()
-    return str(shown) if len(shown) <= 8 else f"[… {', '.join(str(a) for a in shown[-8:])}]"
-
-
-def _corner(point: Floats) -> str:
-    return "(" + ", ".join(f"{v:g}" for v in point.tolist()) + ") m"
 
 
 @check("routes", needs=("anchors",), after=("list_lengths_differ", "unknown_start"))
@@ -174,10 +165,10 @@ def final_yaw(data: SceneData, _rows: Rows) -> Iterator[Finding]:
 
 
 @check("routes", after=("list_lengths_differ", "action_order"))
-def replay_differs(data: SceneData, _rows: Rows) -> Iterator[Finding]:
+def replay_differs(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """The actions, replayed through the motion model, give the stored poses (up to the Approach)."""
     paths = data.paths
-    for row in np.flatnonzero(paths.fit & ~data.flagged("routes", ("action_order",))).tolist():
+    for row in np.flatnonzero(paths.fit & rows.judged).tolist():
         poses, actions = paths.poses(row), paths.action[paths.of(row)]
         flown = replay(poses[0], actions[:-1])
         off = np.abs(flown - poses)
@@ -208,7 +199,7 @@ def stops_far(data: SceneData, _rows: Rows) -> Iterator[Finding]:
 def _anchor_poses(data: SceneData, anchor_of_route: Ints) -> tuple[Mask, Floats]:
     """Which routes have a sound anchor, and every route's anchor's pose, (n, 4)."""
     poses = data["anchors"].floats(*POSE).reshape(-1, 4)
-    return comparable(data, "anchors", anchor_of_route), at(poses, anchor_of_route)
+    return data.comparable("anchors", anchor_of_route), at(poses, anchor_of_route)
 
 
 def _off(fit: Mask, own: Floats, wanted: Floats) -> Iterator[Finding]:

@@ -17,17 +17,7 @@ import numpy as np
 
 from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.dataset.validate.registry import Finding, check
-from aerialdojo_gen.dataset.validate.rows import (
-    START,
-    Ints,
-    Rows,
-    SceneData,
-    Texts,
-    UncheckedError,
-    at,
-    pairs_of,
-    repeated,
-)
+from aerialdojo_gen.dataset.validate.rows import START, Ints, Rows, SceneData, Texts, UncheckedError, at, repeated
 from aerialdojo_gen.pipeline.stages.work.task_ids import key_of, nav_id, reference_id
 
 _SAME_M = 1e-9
@@ -100,7 +90,7 @@ def telling_number(data: SceneData, rows: Rows) -> Iterator[Finding]:
 @check("routes", after=("duplicate_key", "route_in_both_subsets"))
 def duplicate_route(_data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A start anchor and a target make one navigation task."""
-    pairs, nav_ids = pairs_of(rows), rows.texts("nav_id")
+    pairs, nav_ids = rows.pairs(), rows.texts("nav_id")
     for row, first in repeated(pairs):
         yield Finding(row, f"start and target {pairs[row]} as {nav_ids[first]}", "each pair once")
 
@@ -108,7 +98,7 @@ def duplicate_route(_data: SceneData, rows: Rows) -> Iterator[Finding]:
 @check("routes", after=("duplicate_key", "unknown_target", "unknown_start"))
 def nav_id_guessed(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A nav_id is no hash of its start and target that anybody could compute."""
-    for row, (pair, digits) in enumerate(zip(pairs_of(rows), _digits(data, rows), strict=True)):
+    for row, (pair, digits) in enumerate(zip(rows.pairs(), _digits(data, rows), strict=True)):
         if _guessed(data.scene, pair, digits):
             yield Finding(row, f"…-{digits}, a plain hash of the pair {pair}", "a hash with a key")
 
@@ -127,7 +117,7 @@ def image_id_guessed(data: SceneData, rows: Rows) -> Iterator[Finding]:
 def nav_id_of_salt(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A nav_id is what the pipeline's salt makes of its start and target."""
     key = key_of(data.pipeline.split.salt, data.pipeline.seed)
-    yield from _unlike(rows.texts("nav_id"), [nav_id(data.scene, pair, key) for pair in pairs_of(rows)])
+    yield from _unlike(rows.texts("nav_id"), [nav_id(data.scene, pair, key) for pair in rows.pairs()])
 
 
 @check("objects", after=("image_id_guessed", "image_id_twice"))
@@ -141,9 +131,8 @@ def image_id_of_salt(data: SceneData, rows: Rows) -> Iterator[Finding]:
 @check("routes", needs=("objects",), after=("duplicate_key", "unknown_target", "nav_id_guessed", "nav_id_of_salt"))
 def telling_digits(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """Digits and order of nav_ids are independent of target, start, landmark, direction, category and length."""
-    odd = data.flagged("routes", ("duplicate_key", "unknown_target"))
-    fit = np.flatnonzero(~odd)
-    digits = [text for k, text in enumerate(_digits(data, rows)) if not odd[k]]
+    fit = np.flatnonzero(rows.judged)
+    digits = np.array(_digits(data, rows))[fit].tolist()
     if len(fit) < _FEW:
         raise UncheckedError(f"fewer than {_FEW} ids")
     objects, target = data["objects"], data.target_of_route[fit]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -116,8 +116,8 @@ def _run(data: SceneData, one: Check, table: str) -> Outcome:
     missing = [name for name in (table, *one.needs) if name != "mesh" and name not in data.tables]
     if missing:
         return Outcome(one.name, table, skipped=f"{missing[0]} cannot be read")
-    rows = data[table]
     left_out = data.flagged(table, (*(n for n in ALWAYS_AFTER if n != one.name), *one.after))
+    rows = replace(data[table], left_out=left_out)
     try:
         findings = [f for f in one.run(data, rows) if not left_out[f.row]]
     except UncheckedError as reason:
@@ -129,10 +129,8 @@ def _run(data: SceneData, one: Check, table: str) -> Outcome:
     mask = np.zeros(len(rows), dtype=np.bool_)
     mask[[f.row for f in findings if not f.warning]] = True
     data.faulty[table, one.name] = mask
-    faults: dict[bool, list[Fault]] = {False: [], True: []}
+    outcome = Outcome(one.name, table, len(data.sampled(rows)) if one.samples else int(rows.judged.sum()))
     for f in findings:
         fault = Fault(one.name, data.scene, table, rows.part(f.row), rows.key(f.row), f.found, f.expected)
-        faults[f.warning].append(fault)
-    sampled = slice(None) if not one.samples else data.sampled if table == "routes" else data.sampled_objects
-    judged = ~left_out[sampled]
-    return Outcome(one.name, table, int(judged.sum()), faults[False], warnings=faults[True])
+        (outcome.warnings if f.warning else outcome.faults).append(fault)
+    return outcome

@@ -13,6 +13,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import ArrayLike, NDArray
 
+from aerialdojo_gen.base.cached import cached_method
 from aerialdojo_gen.base.config.pipeline import Pipeline
 from aerialdojo_gen.base.rng import rank
 from aerialdojo_gen.geometry.rays import RayCaster
@@ -56,10 +57,16 @@ class Rows:
     table: pa.Table  # The rows, parts one after the other
     parts: tuple[str, ...]  # Paths of the parts, relative to the release
     ends: tuple[int, ...]  # Row after the last one of each part
+    left_out: Mask | None = None  # Rows that a check passes over, for others found fault with them; None for none
 
     def __len__(self) -> int:
         """Count the rows."""
         return int(self.table.num_rows)
+
+    @property
+    def judged(self) -> Mask:
+        """Rows that a check judges, (n,) bool."""
+        return np.ones(len(self), dtype=np.bool_) if self.left_out is None else ~self.left_out
 
     @cached_property
     def part_of(self) -> Ints:
@@ -106,6 +113,16 @@ class Rows:
         found = pc.index_in(keys, value_set=self.column(name))
         return pc.fill_null(found, -1).to_numpy(zero_copy_only=False).astype(np.int64)
 
+    def pairs(self) -> list[str]:
+        """Start anchor and target of every route, as ids are made from them."""
+        columns = (self.ints(name).tolist() for name in ("start_object_id", "start_anchor_id", "target_object_id"))
+        return [f"{start}_{anchor}__{target}" for start, anchor, target in zip(*columns, strict=True)]
+
+    def list_lengths(self) -> Ints:
+        """Count the elements of the five lists of every route, (n, 5) int64; a null list has none."""
+        counts = [pc.fill_null(pc.list_value_length(self.column(name)), 0) for name in LISTS]
+        return np.column_stack([np.asarray(c.to_numpy(zero_copy_only=False), dtype=np.int64) for c in counts])
+
 
 def pose_text(pose: ArrayLike) -> str:
     """Write a pose, x, y, z in metres and yaw in radians."""
@@ -122,12 +139,6 @@ def at(values: NDArray[Any], rows: Ints) -> NDArray[Any]:
     """Values at rows; NaN, or -1 of whole numbers, where a row is -1."""
     gap = np.full((1, *values.shape[1:]), np.nan if values.dtype.kind == "f" else -1)
     return np.concatenate([values, gap])[rows]
-
-
-def pairs_of(routes: Rows) -> list[str]:
-    """Start anchor and target of every route, as ids are made from them."""
-    columns = (routes.ints(name).tolist() for name in ("start_object_id", "start_anchor_id", "target_object_id"))
-    return [f"{start}_{anchor}__{target}" for start, anchor, target in zip(*columns, strict=True)]
 
 
 def repeated(keys: Iterable[Hashable]) -> Iterator[tuple[int, int]]:
@@ -205,15 +216,9 @@ class Paths:
         return np.asarray(np.linalg.norm(self.ends[:, :3] - self.starts[:, :3], axis=1))
 
 
-def list_lengths(routes: Rows) -> Ints:
-    """Count the elements of the five lists, (n, 5) int64; a null list has none."""
-    counts = [pc.fill_null(pc.list_value_length(routes.column(name)), 0) for name in LISTS]
-    return np.column_stack([np.asarray(c.to_numpy(zero_copy_only=False), dtype=np.int64) for c in counts])
-
-
 def paths_of(routes: Rows) -> Paths:
     """Lay out the poses of a scene's routes."""
-    lengths = list_lengths(routes)
+    lengths = routes.list_lengths()
     fit = (lengths == lengths[:, :1]).all(axis=1) & (lengths[:, 0] >= 2)
     table = routes.table.filter(pa.array(fit)) if not fit.all() else routes.table
     flat = {}
@@ -258,6 +263,11 @@ class SceneData:
                 mask |= self.faulty[table, name]
         return mask
 
+    def comparable(self, table: str, rows: Ints) -> Mask:
+        """Whether looked-up rows of a table exist and are fit to compare with, (n,) bool."""
+        good = ~self.flagged(table, (*ALWAYS_AFTER, "duplicate_key"))
+        return (rows >= 0) & np.append(good, False)[rows]
+
     def cached(self, name: str, make: Callable[[], T]) -> T:
         """Return what one check has made for all others, made now where none has."""
         if name not in self.cache:
@@ -300,27 +310,21 @@ class SceneData:
         """The mesh for first hits."""
         return ray_caster(self.mesh)
 
-    def sampled_routes(self, *faults: str) -> Iterator[int]:
-        """Sampled routes without any of these faults."""
-        skip = self.flagged("routes", faults)
-        yield from (row for row in self.sampled.tolist() if not skip[row])
+    def sampled(self, rows: Rows) -> Ints:
+        """Judged rows to check at length, all or so many by a draw from ids: routes with FCL, objects' pictures."""
+        drawn = self._drawn(rows.name)
+        return drawn[rows.judged[drawn]]
 
-    @cached_property
-    def sampled(self) -> Ints:
-        """Routes that FCL checks: all whose lists fit together, or so many by a draw from their ids."""
-        rows = np.flatnonzero(self.paths.fit)
-        if self.sample is None or self.sample >= len(rows):
-            return rows
-        nav_ids = self["routes"].texts("nav_id")
-        order = sorted(rows.tolist(), key=lambda row: rank(0, "validate", nav_ids[row]))
-        return np.sort(np.array(order[: self.sample], dtype=np.int64))
-
-    @cached_property
-    def sampled_objects(self) -> Ints:
-        """Rows of `objects` whose pictures are rendered again: all, or so many by a draw from their ids."""
-        ids = self["objects"].ints("object_id").tolist()
-        order = sorted(range(len(ids)), key=lambda row: rank(0, "validate", self.scene, ids[row]))
-        return np.sort(np.array(order[: self.pictures], dtype=np.int64))
+    @cached_method
+    def _drawn(self, table: str) -> Ints:
+        keys: list[tuple[Any, ...]]
+        if table == "routes":
+            fit, most, keys = np.flatnonzero(self.paths.fit), self.sample, [(k,) for k in self[table].texts("nav_id")]
+        else:
+            keys = [(self.scene, k) for k in self[table].ints("object_id").tolist()]
+            fit, most = np.arange(len(keys)), self.pictures
+        order = sorted(fit.tolist(), key=lambda row: rank(0, "validate", *keys[row]))
+        return np.sort(np.array(order[:most], dtype=np.int64))
 
     @cached_property
     def route_of_task(self) -> Ints:
