@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from aerialdojo_gen.annotations.bearings import Bearing
 from aerialdojo_gen.annotations.claims import SceneClaims
-from aerialdojo_gen.annotations.format import Landmark, Object, Source
-from aerialdojo_gen.annotations.landmarks import reaches_into
+from aerialdojo_gen.annotations.format import Fault, Landmark, Object, Source
 from aerialdojo_gen.annotations.matching import Matcher
-from aerialdojo_gen.annotations.positions import Fault
-from aerialdojo_gen.annotations.relations import SceneGeometry
+from aerialdojo_gen.annotations.relations import Bearing, SceneGeometry
 from aerialdojo_gen.annotations.vocabulary import Vocabulary
 from aerialdojo_gen.base.names import nearest
 from aerialdojo_gen.base.safe_parse import JsonPath
-from aerialdojo_gen.scenes.model import Scene
+from aerialdojo_gen.scenes.model import Instance, Scene
 
 # Not allowed in names and descriptions: node names, decimals, number pairs, measured lengths.
 _UNSPOKEN = re.compile(
@@ -115,7 +113,7 @@ class _Checker:
         elif isinstance(entry, Landmark):
             if not reaches_into(scene, scene[node]):
                 yield self._fault((*path, "node"), f"{node!r} stands outside the scene's bounds")
-        elif not _inside(scene, scene[node].centroid):
+        elif not is_inside(scene, scene[node].centroid):
             yield self._fault((*path, "node"), f"the middle of {node!r} is outside the scene's bounds")
 
     def _object(self, path: JsonPath, entry: Object) -> Iterator[Fault]:
@@ -127,7 +125,7 @@ class _Checker:
         elif not scene.imported and entry.node in scene and scene[entry.node].category != category:
             text = f"is {category!r}, the node {entry.node!r} is a {scene[entry.node].category!r}"
             yield self._fault((*path, "category"), text)
-        if entry.anchor is not None and not _inside(scene, entry.anchor.position_m):
+        if entry.anchor is not None and not is_inside(scene, entry.anchor.position_m):
             yield self._fault((*path, "anchor", "position_m"), "outside the scene's bounds")
 
     def _texts(self) -> Iterator[Fault]:
@@ -159,7 +157,7 @@ class _Checker:
             for false in matcher.faults(i, entry.name):
                 yield self._fault(("objects", k, "name"), false)
             if entry.description is None or not entry.description.strip():
-                if others := self._listed(self.claims.distractors(i, self.claims.of(i))):
+                if others := self.claims.listed(self.claims.distractors(i, self.claims.of(i))):
                     text = f"nothing tells it from {others}, {bearing.direction} of the same landmark"
                     yield self._fault(("objects", k, "node"), f"{text}: choose another object")
                 continue
@@ -179,21 +177,14 @@ class _Checker:
             yield self._fault(path, false)
         if words := matcher.read(entry.description, i).unchecked:
             self.unchecked[k] = words
-        for text, what in ((entry.description, "it"), (first_sentence(entry.name, entry.description), "its start")):
-            if others := self._listed(self.claims.distractors(i, matcher.true_claims(i, text))):
+        # A reader may stop after the first sentence.
+        start = f"The {entry.name}: {re.split(r'(?<=[.!?])[ ]', entry.description.strip(), maxsplit=1)[0]}"
+        for text, what in ((entry.description, "it"), (start, "its start")):
+            if others := self.claims.listed(self.claims.distractors(i, matcher.true_claims(i, text))):
                 where = f"{what} fits {others} as well, {bearing.direction} of the same landmark"
                 hint = "" if what == "it" else " in the first sentence"
                 yield self._fault(path, f"ambiguous: {where}; say{hint} how it differs or what stands near it")
                 break
-
-    def _listed(self, instances: Sequence[int]) -> str:
-        nodes = ", ".join(self._scene.instances[j].node for j in instances[:3])
-        return nodes + ("..." if len(instances) > 3 else "")
-
-
-def first_sentence(name: str, description: str) -> str:
-    """The name and the first sentence of a description: a reader may stop there."""
-    return f"The {name}: {re.split(r'(?<=[.!?])[ ]', description.strip(), maxsplit=1)[0]}"
 
 
 def description_faults(text: str) -> Iterator[str]:
@@ -214,5 +205,14 @@ def description_faults(text: str) -> Iterator[str]:
         yield f"has more than {_WORDS} words"
 
 
-def _inside(scene: Scene, point: Sequence[float] | np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> bool:
+def is_inside(scene: Scene, point: ArrayLike) -> bool:
+    """Whether a point is within a scene's bounds."""
     return bool(np.all(np.asarray(point) >= scene.bounds[0]) and np.all(np.asarray(point) <= scene.bounds[1]))
+
+
+def reaches_into(scene: Scene, instance: Instance) -> bool:
+    """Whether a landmark's middle lies over the site and some of it below the ceiling, as a high mast's does."""
+    (x0, y0, z0), (x1, y1, z1) = scene.bounds.tolist()
+    x, y, _ = instance.centroid.tolist()
+    bottom, top = instance.bounds[:, 2].tolist()
+    return x0 <= x <= x1 and y0 <= y <= y1 and bottom <= z1 and top >= z0

@@ -17,12 +17,20 @@ from typing import Any
 import numpy as np
 
 from aerialdojo_gen.annotations.appearance import SHADES, unsupported_colours
-from aerialdojo_gen.annotations.bearings import BORDER_DEG, Bearing, lies_towards, nearest_landmark
 from aerialdojo_gen.annotations.format import Landmark
+from aerialdojo_gen.annotations.phrases import TABLES
 from aerialdojo_gen.annotations.places import Places, places_of
-from aerialdojo_gen.annotations.relations import AGAINST_M, AT_M, DISTRACTOR_SLACK, SceneGeometry
+from aerialdojo_gen.annotations.relations import (
+    AGAINST_M,
+    AT_M,
+    BORDER_DEG,
+    DISTRACTOR_SLACK,
+    Bearing,
+    SceneGeometry,
+    lies_towards,
+    nearest_landmark,
+)
 from aerialdojo_gen.annotations.vocabulary import Vocabulary
-from aerialdojo_gen.annotations.words import TABLES
 from aerialdojo_gen.base.cached import cached_method
 from aerialdojo_gen.base.constants import DIRECTIONS
 from aerialdojo_gen.geometry.frames import compass_direction
@@ -121,6 +129,10 @@ class SceneClaims:
     def distractors(self, i: int, claims: Sequence[Claim]) -> list[int]:
         """Instances that claims of `i` fit as well: only other claims distinguish them from it."""
         return [j for j in self.candidates(i) if all(self.holds(claim, j, DISTRACTOR_SLACK) for claim in claims)]
+
+    def listed(self, instances: Sequence[int]) -> str:
+        """Name the first of some instances by their nodes."""
+        return ", ".join(self.scene.instances[j].node for j in instances[:3]) + ("..." if len(instances) > 3 else "")
 
     @cached_method
     def of(self, i: int) -> tuple[Claim, ...]:

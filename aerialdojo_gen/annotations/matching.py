@@ -14,8 +14,7 @@ from functools import cached_property, lru_cache
 
 from aerialdojo_gen.annotations.appearance import SHADES
 from aerialdojo_gen.annotations.claims import Claim, Mention, SceneClaims
-from aerialdojo_gen.annotations.phrases import phrases_of_value, plural, spoken
-from aerialdojo_gen.annotations.words import LISTS, TABLES
+from aerialdojo_gen.annotations.phrases import LISTS, TABLES, phrases_of_value, plural, spoken
 from aerialdojo_gen.base.constants import DIRECTIONS
 from aerialdojo_gen.scenes.model import Instance
 

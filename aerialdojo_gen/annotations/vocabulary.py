@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from aerialdojo_gen.annotations.appearance import repeats, unsupported_colours
-from aerialdojo_gen.annotations.ground import Surface
+from aerialdojo_gen.annotations.appearance import Surface, repeats, unsupported_colours
 from aerialdojo_gen.annotations.phrases import CategoryWords, group_of, noun_of, spoken, words_of
 from aerialdojo_gen.base.cached import cached_method
 from aerialdojo_gen.scenes.appearances import Appearance

@@ -12,9 +12,8 @@ from support.annotation_scenes import PAINTS, box, street
 
 from aerialdojo_gen.annotations.check import check_source
 from aerialdojo_gen.annotations.claims import SceneClaims
-from aerialdojo_gen.annotations.draft import AnnotationDrafter, DraftOptions
+from aerialdojo_gen.annotations.draft import AnnotationDrafter, DraftOptions, choose_landmarks
 from aerialdojo_gen.annotations.format import Annotations, format_annotations, parse_annotations
-from aerialdojo_gen.annotations.landmarks import choose_landmarks
 from aerialdojo_gen.annotations.language.writer import Writer
 from aerialdojo_gen.annotations.phrases import article, noun_of, words_of
 from aerialdojo_gen.annotations.vocabulary import Vocabulary

@@ -11,10 +11,15 @@ from hypothesis import strategies as st
 from support import handmade
 from support.annotation_scenes import box, street, street_vocabulary
 
-from aerialdojo_gen.annotations.bearings import BORDER_DEG, lies_towards, nearest_landmark
 from aerialdojo_gen.annotations.claims import KINDS, Claim, Mention, SceneClaims
 from aerialdojo_gen.annotations.format import Landmark
-from aerialdojo_gen.annotations.relations import DISTRACTOR_SLACK, SceneGeometry
+from aerialdojo_gen.annotations.relations import (
+    BORDER_DEG,
+    DISTRACTOR_SLACK,
+    SceneGeometry,
+    lies_towards,
+    nearest_landmark,
+)
 from aerialdojo_gen.base.constants import DIRECTIONS
 from aerialdojo_gen.base.rng import generator
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from aerialdojo_gen.annotations.claims import Claim, SceneClaims
 from aerialdojo_gen.annotations.language.locations import WHERE
-from aerialdojo_gen.annotations.language.subject import Wording, wordings_of
+from aerialdojo_gen.annotations.language.nouns import Wording, wordings_of
 from aerialdojo_gen.annotations.relations import DISTRACTOR_SLACK
 from aerialdojo_gen.base.rng import pick
 from aerialdojo_gen.scenes.appearances import Appearance

@@ -6,12 +6,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from aerialdojo_gen.annotations.claims import Claim, Mention, SceneClaims
-from aerialdojo_gen.annotations.language.grammar import FOLDER
 from aerialdojo_gen.annotations.language.nouns import Names, noun_phrase
 from aerialdojo_gen.annotations.phrases import group_of
 from aerialdojo_gen.base.constants import DIRECTIONS
@@ -56,7 +56,7 @@ _HOLDS: Mapping[str, Callable[[SceneClaims, int, int, Any], bool]] = {
 @cache
 def relation_phrases() -> Mapping[str, Mapping[str, tuple[RelationPhrase, ...]]]:
     """Read the wordings, by table and the claim's key."""
-    path = FOLDER / "relations.toml"
+    path = Path(__file__).with_name("relations.toml")
     tables = read_toml(path, AnnotationError)
     return {
         name: {

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from aerialdojo_gen.annotations.language.grammar import LEVELS
+from aerialdojo_gen.annotations.language.sentences import LEVELS
 from aerialdojo_gen.base.rng import generator, rank
 from aerialdojo_gen.dataset.stats.comparison import Listing
 from aerialdojo_gen.store import shards as store

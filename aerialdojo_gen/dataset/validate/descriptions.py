@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import contextlib
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Any
 
 from aerialdojo_gen.annotations.claims import Claim, SceneClaims
@@ -77,7 +77,7 @@ def object_words(data: SceneData, rows: Rows) -> Iterator[Finding]:
 @check("objects", needs=("landmarks", "mesh"), after=(*_FAULTS, "object_words", "object_claims"))
 def object_ambiguous(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A text fits nothing else of its category in the same direction of the same landmark."""
-    known, matcher, instances = _scene_claims(data), _matcher(data), data.mesh.instances
+    known, matcher = _scene_claims(data), _matcher(data)
     for row, i in _placed(known, rows):
         own = _claims(rows, row) or []
         made = [(one["text"], one["claims"]) for one in _made(rows, row) if one["claims"]]
@@ -85,7 +85,7 @@ def object_ambiguous(data: SceneData, rows: Rows) -> Iterator[Finding]:
         told = {text for text, _ in made}
         texts += [(t, matcher.true_claims(i, t)) for _, t in _texts(rows, row) if t not in told]
         for text, claims in texts or [("all that is claimed", own)]:
-            if others := _listed(instances, known.distractors(i, claims)):
+            if others := known.listed(known.distractors(i, claims)):
                 yield Finding(row, f"{text!r}, which fits {others} as well", "words that fit one thing")
                 break
 
@@ -128,10 +128,6 @@ def _turned(known: SceneClaims, i: int, text: str) -> str:
     said = re.findall(rf"\b({'|'.join(DIRECTIONS)})(?:ern)?(?: side)? of the {re.escape(name)}\b", plain)
     wrong = [direction for direction in said if direction != bearing.direction]
     return f"{wrong[0]} of the {name}, and the goal says {bearing.direction}" if wrong else ""
-
-
-def _listed(instances: Sequence[Instance], some: Sequence[int]) -> str:
-    return ", ".join(instances[j].node for j in some[:3]) + ("..." if len(some) > 3 else "")
 
 
 @check("objects", after=("object_words",))

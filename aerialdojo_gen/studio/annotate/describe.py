@@ -7,10 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from aerialdojo_gen.annotations.bearings import nearest_landmark
 from aerialdojo_gen.annotations.check import check_source
 from aerialdojo_gen.annotations.format import Annotations, Object, format_annotations, parse_annotations
-from aerialdojo_gen.annotations.relations import SceneGeometry
+from aerialdojo_gen.annotations.relations import SceneGeometry, nearest_landmark
 from aerialdojo_gen.annotations.vocabulary import Vocabulary
 from aerialdojo_gen.imports.forms import is_unnamed
 from aerialdojo_gen.studio.annotate.document import called

@@ -7,11 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aerialdojo_gen.annotations.language.grammar import SLOTS, expand, frames
 from aerialdojo_gen.annotations.language.locations import Location, relation_phrases
-from aerialdojo_gen.annotations.language.nouns import Name, NounPhrase, name_of, noun_phrase
-from aerialdojo_gen.annotations.language.sentences import Content, compose
-from aerialdojo_gen.annotations.language.subject import Wording, phrase_of
+from aerialdojo_gen.annotations.language.nouns import Name, NounPhrase, Wording, name_of, noun_phrase, phrase_of
+from aerialdojo_gen.annotations.language.sentences import SLOTS, Content, compose, expand, frames
 from aerialdojo_gen.annotations.language.writer import LENGTHS
 from aerialdojo_gen.annotations.phrases import article
 

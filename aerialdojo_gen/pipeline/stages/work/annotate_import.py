@@ -11,8 +11,7 @@ import pyarrow as pa
 
 from aerialdojo_gen.annotations.check import check_source
 from aerialdojo_gen.annotations.claims import SceneClaims
-from aerialdojo_gen.annotations.format import Annotations, parse_annotations
-from aerialdojo_gen.annotations.positions import Fault
+from aerialdojo_gen.annotations.format import Annotations, Fault, parse_annotations
 from aerialdojo_gen.annotations.relations import SceneGeometry
 from aerialdojo_gen.annotations.vocabulary import Vocabulary
 from aerialdojo_gen.base.config.sections import AnnotateImportConfig
