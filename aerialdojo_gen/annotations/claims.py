@@ -165,8 +165,7 @@ class SceneClaims:
 
     def _values(self, instance: Instance) -> Iterator[Claim]:
         attributes = instance.attributes
-        colour = attributes.get("colour", "")
-        if colour and (self.scene.imported or not unsupported_colours(colour, instance, self.scene.materials)):
+        if colour := self.vocabulary.colour_of(instance):
             yield Claim("colour", colour)
         if attributes.get("size"):
             yield Claim("size", attributes["size"])

@@ -42,21 +42,19 @@ class Vocabulary:
                     words = replace(words, nouns=(), plural_heads=(), collectives=(), group=group)
                 by_category[i.category] = words
         self.words = [by_category[i.category] for i in scene.instances]
-        self.nouns = [
-            noun_of(self._drop_false_colour(i), w) for i, w in zip(scene.instances, self.words, strict=True)
-        ]
+        shown = (replace(i, attributes={**i.attributes, "colour": self.colour_of(i)}) for i in scene.instances)
+        self.nouns = [noun_of(i, w) for i, w in zip(shown, self.words, strict=True)]
 
     @classmethod
     def of(cls, scene: Scene, catalogue: Catalogue) -> Vocabulary:
         """Return the scene context's vocabulary of a catalogue."""
         return context_of(scene).part("vocabulary", lambda: cls(scene, catalogue), catalogue)
 
-    def _drop_false_colour(self, instance: Instance) -> Instance:
-        """Remove a colour attribute that the surface does not support."""
+    def colour_of(self, instance: Instance) -> str:
+        """An instance's attribute of colour; empty where its surface does not support that."""
         colour = instance.attributes.get("colour", "")
-        if not colour or self.scene.imported or not unsupported_colours(colour, instance, self.scene.materials):
-            return instance
-        return replace(instance, attributes={k: v for k, v in instance.attributes.items() if k != "colour"})
+        known = self.scene.imported or not unsupported_colours(colour, instance, self.scene.materials)
+        return colour if known else ""
 
     def appearances_of(self, instance: Instance) -> tuple[Appearance, ...]:
         """Phrases that the catalogue has for an instance's category."""

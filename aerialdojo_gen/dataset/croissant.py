@@ -3,14 +3,22 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
 
 from aerialdojo_gen.base.version import __version__
-from aerialdojo_gen.dataset.contents import CROISSANT, TABLES, Table, check_release, counts, meaning, unit
-from aerialdojo_gen.store.root import Where, open_root
+from aerialdojo_gen.dataset.contents import (
+    CROISSANT,
+    TABLES,
+    Table,
+    check_release,
+    counts,
+    meaning,
+    unit,
+    write_document,
+)
+from aerialdojo_gen.store.root import Where
 
 # Of this version's output. Not the day of the run: the same sources give the same bytes on any day.
 PUBLISHED = "2026-11-21"
@@ -140,10 +148,7 @@ def _kind(field: pa.Field) -> tuple[pa.DataType, Document]:
     return (field.type.value_type, {"repeated": True}) if pa.types.is_list(field.type) else (field.type, {})
 
 
-def write_croissant(data: Where) -> Path:
+def write_croissant(data: Where) -> None:
     """Write ``release/croissant.json`` from what the release holds."""
-    root = open_root(data)
-    found = counts(root, check_release(root))
-    with root.commit(CROISSANT) as path:
-        path.write_text(json.dumps(croissant(found), indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
-    return root.local_copy(CROISSANT)
+    found = croissant(counts(data, check_release(data)))
+    write_document(data, CROISSANT, json.dumps(found, indent=1, ensure_ascii=False) + "\n")

@@ -8,7 +8,7 @@ import pytest
 from support.command_line import said
 
 from aerialdojo_gen.base.errors import UsageError
-from aerialdojo_gen.dataset.pictures import pictured_objects, scenes_with_pictures
+from aerialdojo_gen.dataset.lookup import pictured_objects, scenes_with_pictures
 
 
 def test_a_release_alone_has_the_same_pictures(smoke, tmp_path):

@@ -135,7 +135,11 @@ def compose(
     `used` are first words that it must not begin with.
     """
     if content.level in ("terse", "vague") and content.details:
-        return _with_tail(content, held_out, used, rng)
+        # The detail is said right after the noun.
+        if content.phrase.tail or " with " in content.phrase.bare or len(content.details) > 1:
+            return None
+        tail = f"with {pick(content.details[0][0].details, rng)}"
+        content = replace(content, phrase=replace(content.phrase, tail=tail), details=())
     places, details = list(content.places), list(content.details)
     section = "normal" if content.level == "detailed" else content.level
     kinds = {"at": _KINDS["at"]}
@@ -150,7 +154,11 @@ def compose(
     first = _choose(_fitting(section, kind, held_out, bool(content.verb[1]), tailed), rng)
     if first is None:
         return None
-    slots = _slots(content, rng)
+    verb, participle = content.verb
+    slots = {
+        "a": content.phrase.a, "the": content.phrase.the, "np": content.phrase.bare,
+        "be": verb, "ing": participle, "stands": "is" if " " in verb else verb,
+    }  # fmt: skip
     own = places[:1]
     if kind == "ref":
         slots |= {"ref": own[0].thing, "byit": own[0].pronoun}
@@ -168,37 +176,14 @@ def compose(
     for wording, unique in details:
         said.append(_detail(wording, unique, said, rng))
     for place in places[len(own) :]:
-        said.append(_place(place, "" if first.slots & _VERBS else content.verb[0], said, rng))
-    text = " ".join(_ended(frame.text.format(**slots)) for frame, slots in said)
+        said.append(_place(place, "" if first.slots & _VERBS else verb, said, rng))
+    sentences = [frame.text.format(**slots) for frame, slots in said]
+    text = " ".join(one if one[-1] in ".?!" else f"{one}." for one in sentences)
     text = _STARTS.sub(lambda m: m[1] + m[2].upper(), " ".join(text.split()))
     text = text.removesuffix(".") if content.level == "terse" else text
     if " ".join(text.split()[:_OPENING]) in used or _AWKWARD.search(text):
         return None
     return text, " | ".join(frame.text for frame, _ in said), first.held_out
-
-
-def _with_tail(
-    content: Content, held_out: bool, used: Collection[str], rng: np.random.Generator
-) -> tuple[str, str, bool] | None:
-    """Say the detail right after the noun."""
-    phrase = content.phrase
-    if phrase.tail or " with " in phrase.bare or len(content.details) > 1:
-        return None
-    detail = pick(content.details[0][0].details, rng)
-    named = replace(content, phrase=replace(phrase, tail=f"with {detail}"), details=())
-    return compose(named, held_out, used, rng)
-
-
-def _slots(content: Content, rng: np.random.Generator) -> dict[str, str]:
-    verb, participle = content.verb
-    return {
-        "a": content.phrase.a,
-        "the": content.phrase.the,
-        "np": content.phrase.bare,
-        "be": verb,
-        "ing": participle,
-        "stands": "is" if " " in verb else verb,
-    }
 
 
 @cache
@@ -258,7 +243,3 @@ def _frame(
     frame = _choose([f for f in pool if not heard & set(_LOOKING.findall(f.text))] or pool, rng)
     assert frame is not None
     return frame
-
-
-def _ended(text: str) -> str:
-    return text if text[-1] in ".?!" else f"{text}."

@@ -85,7 +85,7 @@ def anchor_score(data: SceneData, rows: Rows) -> Iterator[Finding]:
             yield Finding(row, f"score = {score:.6g}", f"{expected:.6g} by its parts")
 
 
-@check("anchors", needs=("objects", "mesh"), after=("unknown_object",))
+@check("anchors", after=("unknown_object",))
 def anchor_front(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """An anchor says how far off its object's front it is; a goal more than 60 degrees off says why."""
     scene, nodes, off = data.mesh, data["objects"].texts("mesh_node"), rows.floats("off_front_rad")
@@ -106,7 +106,7 @@ def anchor_front(data: SceneData, rows: Rows) -> Iterator[Finding]:
             yield Finding(row, f"no_front_reason = {reasons[row]!r}", expected)
 
 
-@check("anchors", needs=("objects",), after=("unknown_object",))
+@check("anchors", after=("unknown_object",))
 def anchor_step(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A selected anchor steps back as far as its object's picture was taken, in centimetres."""
     back, most = rows.floats("step_back_m"), data.pipeline.anchor_sample.step_back_m
@@ -119,7 +119,7 @@ def anchor_step(data: SceneData, rows: Rows) -> Iterator[Finding]:
             yield Finding(row, f"step_back_m = {back[row]:.6g}", f"{stored[k]:g}, as far as its picture was taken")
 
 
-@check("viewpoints", needs=("objects", "mesh"), after=("viewpoint_object",))
+@check("viewpoints", after=("viewpoint_object",))
 def viewpoint_place(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A viewpoint is at the standoff from its object's surface and faces its centre; numbers count from 0."""
     expected = data.pipeline.anchor_sample.standoff_m
@@ -146,7 +146,7 @@ def _distances(data: SceneData, rows: Rows) -> Iterator[tuple[int, Ints, Floats]
             yield k, own, Surface.of(scene[str(nodes[k])]).distance_m(place[own])
 
 
-@check("viewpoints", needs=("mesh",), after=("viewpoint_place",))
+@check("viewpoints", after=("viewpoint_place",))
 def viewpoint_clearance(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A body can be at a viewpoint, inside the flight volume."""
     world, radius = data.world, data.pipeline.embodiment.radius_m
@@ -158,7 +158,7 @@ def viewpoint_clearance(data: SceneData, rows: Rows) -> Iterator[Finding]:
             yield Finding(row, "a place in collision", "a free one")
 
 
-@check("anchors", needs=("objects",), after=("unknown_object",))
+@check("anchors", after=("unknown_object",))
 def anchor_yaw(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """An anchor faces its object's centre, unless a person placed it."""
     item, own = data.objects_of(rows), rows.floats("yaw_rad")
@@ -169,7 +169,7 @@ def anchor_yaw(data: SceneData, rows: Rows) -> Iterator[Finding]:
         yield Finding(int(row), f"{own[row]:.6f} rad", f"{yaw[row]:.6f} rad")
 
 
-@check("anchors", needs=("objects", "mesh"), after=("unknown_object",))
+@check("anchors", after=("unknown_object",))
 def anchor_surface(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """An anchor is 1 m from its object's surface (about that, where a person placed it), and says how far."""
     annotated = rows.texts("selected_by") == "annotation"
@@ -183,7 +183,7 @@ def anchor_surface(data: SceneData, rows: Rows) -> Iterator[Finding]:
                 yield Finding(row, f"surface_distance_m = {stored[row]:.6g}", f"{distance:.6g}")
 
 
-@check("anchors", needs=("mesh",), after=("anchor_surface",))
+@check("anchors", after=("anchor_surface",))
 def anchor_clearance(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """An anchor is free of collision, and says how far the nearest surface is."""
     world, radius = data.world, data.pipeline.embodiment.radius_m

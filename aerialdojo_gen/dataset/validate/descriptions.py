@@ -46,7 +46,7 @@ _ANY_COLOUR = f"({'|'.join(_COLOURS)})"
 _NO_PART = {*_COLOURS, "and", "dark", "light", "pale", "bright", "deep"}
 
 
-@check("objects", needs=("landmarks", "mesh"), after=_FAULTS)
+@check("objects", after=_FAULTS)
 def object_claims(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """Every claim about an object is so of the mesh, and of the very things that it names."""
     known = _scene_claims(data)
@@ -59,7 +59,7 @@ def object_claims(data: SceneData, rows: Rows) -> Iterator[Finding]:
             yield Finding(row, f"it claims {said}", f"what is so of {data.mesh.instances[i].node}")
 
 
-@check("objects", needs=("landmarks", "mesh"), after=_FAULTS)
+@check("objects", after=_FAULTS)
 def object_words(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """Names and texts name their own thing, and say no value, relation or direction that is not so in the mesh."""
     known, matcher, instances = _scene_claims(data), _matcher(data), data.mesh.instances
@@ -74,7 +74,7 @@ def object_words(data: SceneData, rows: Rows) -> Iterator[Finding]:
                 break
 
 
-@check("objects", needs=("landmarks", "mesh"), after=(*_FAULTS, "object_words", "object_claims"))
+@check("objects", after=(*_FAULTS, "object_words", "object_claims"))
 def object_ambiguous(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A text fits nothing else of its category in the same direction of the same landmark."""
     known, matcher = _scene_claims(data), _matcher(data)
@@ -143,7 +143,7 @@ def text_form(_data: SceneData, rows: Rows) -> Iterator[Finding]:
                 yield Finding(row, f"{name} = {text!r}", "printable letters")
 
 
-@check("landmarks", needs=("mesh",), after=("landmark_node",))
+@check("landmarks", after=("landmark_node",))
 def landmark_name(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A landmark's name is one of a kind, names its own thing, and says no value that the mesh does not bear out."""
     known, matcher, instances = _scene_claims(data), _matcher(data), data.mesh.instances

@@ -47,7 +47,7 @@ _WIDE = SearchAttempt(weight=0.97, budget=400_000, duplicate_cell_m=0.25)
 _SHORTER_M, _SHORTER_SHARE = 1.0, 0.15
 
 
-@check("routes", needs=("mesh",), after=_FITS, samples=True)
+@check("routes", after=_FITS, samples=True)
 def needless_piece(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """No piece of a route is flown for nothing: the straight way between its ends is blocked, or hardly shorter."""
     world, room = data.world, data.pipeline.embodiment.radius_m + _ROOM_M
@@ -64,7 +64,7 @@ def needless_piece(data: SceneData, rows: Rows) -> Iterator[Finding]:
                 break
 
 
-@check("routes", needs=("mesh", "anchors"), after=(*_FITS, "goal_anchor", "end_position"))
+@check("routes", after=(*_FITS, "goal_anchor", "end_position"))
 def long_way_round(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """No route is much longer than a way over a grid of 1 m cells, found anew from every goal."""
     paths = data.paths

@@ -39,7 +39,7 @@ _EXPECTED = f"a success at {SUCCESS_RADIUS_M:g} m, SPL {MIN_SPL:g} or more"
 _REPLAY_M = 1e-5
 
 
-@check("routes", needs=("mesh",), after=_FITS, samples=True)
+@check("routes", after=_FITS, samples=True)
 def route_collision(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """The body's sweep along the stored positions touches no surface (FCL, a capsule a leg)."""
     world, radius, cap = data.world, data.pipeline.embodiment.radius_m, data.pipeline.plan.clearance_cap_m
@@ -53,7 +53,7 @@ def route_collision(data: SceneData, rows: Rows) -> Iterator[Finding]:
             yield Finding(row, f"the body touches a surface {hit}", "a free sweep")
 
 
-@check("routes", needs=("mesh",), after=(*_FITS, "action_order", "replay_differs", "route_collision"), samples=True)
+@check("routes", after=(*_FITS, "action_order", "replay_differs", "route_collision"), samples=True)
 def replay_collision(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """The body's sweep along the replayed actions touches no surface."""
     world, radius = data.world, data.pipeline.embodiment.radius_m
@@ -67,7 +67,7 @@ def replay_collision(data: SceneData, rows: Rows) -> Iterator[Finding]:
             yield Finding(row, f"the body touches a surface {hit}", "a free sweep")
 
 
-@check("routes", needs=("mesh",), after=(*_FITS, "route_collision"), samples=True)
+@check("routes", after=(*_FITS, "route_collision"), samples=True)
 def min_clearance(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """The stored clearance is right: a body a little thinner passes everywhere, one a little thicker does not."""
     world, cap = data.world, data.pipeline.plan.clearance_cap_m
@@ -110,7 +110,7 @@ def _clearance_m(world: CollisionWorld, legs: Floats, cap: float) -> float:
 
 
 # Not sampled: a leg that the clearance grid proves free costs next to nothing.
-@check("routes", needs=("tasks", "mesh"), after=_ROUTE_FAULTS)
+@check("routes", after=_ROUTE_FAULTS)
 def oracle_fails(data: SceneData, routes: Rows) -> Iterator[Finding]:
     """An agent that flies the actions, by the environment's motion and collision, succeeds within the budget."""
     space = FlightSpace(data.mesh, data.pipeline.embodiment.radius_m, data.world)
@@ -119,11 +119,7 @@ def oracle_fails(data: SceneData, routes: Rows) -> Iterator[Finding]:
             yield Finding(row, lack, _EXPECTED)
 
 
-@check(
-    "routes",
-    needs=("tasks", "objects", "mesh"),
-    after=(*_ROUTE_FAULTS, "oracle_fails", "unknown_target", "agent_action"),
-)
+@check("routes", after=(*_ROUTE_FAULTS, "oracle_fails", "unknown_target", "agent_action"))
 def agent_action_fails(data: SceneData, routes: Rows) -> Iterator[Finding]:
     """The list agent_action is an agent's: flown it stops within 1 m of the anchor, the target in sight."""
     scene, paths = data.mesh, data.paths

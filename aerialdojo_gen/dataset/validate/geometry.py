@@ -96,7 +96,7 @@ def route_setting(data: SceneData, rows: Rows) -> Iterator[Finding]:
         yield Finding(int(row), str(stored[row]), f"{setting[row]}, for {length[row]:.4f} m")
 
 
-@check("routes", needs=("scenes",), after=("list_lengths_differ",))
+@check("routes", after=("list_lengths_differ",))
 def out_of_bounds(data: SceneData, _rows: Rows) -> Iterator[Finding]:
     """The body never leaves the flight volume."""
     paths, scenes = data.paths, data["scenes"]
@@ -132,7 +132,7 @@ def _differs(stored: Floats, computed: Floats, unit: str) -> Iterator[Finding]:
         yield Finding(row, f"{stored[row]:.9g}{unit}", f"{computed[row]:.9g}{unit}")
 
 
-@check("routes", needs=("anchors",), after=("list_lengths_differ", "unknown_start"))
+@check("routes", after=("list_lengths_differ", "unknown_start"))
 def start_anchor(data: SceneData, _rows: Rows) -> Iterator[Finding]:
     """A route starts on its start anchor, turned by 180°."""
     fit, anchor = _anchor_poses(data, data.start_of_route)
@@ -140,14 +140,14 @@ def start_anchor(data: SceneData, _rows: Rows) -> Iterator[Finding]:
     yield from _off(fit, data.paths.starts, anchor)
 
 
-@check("routes", needs=("anchors",), after=("unknown_target",))
+@check("routes", after=("unknown_target",))
 def goal_anchor(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """The goal is the target's selected anchor."""
     fit, anchor = _anchor_poses(data, data.goal_of_route)
     yield from _off(fit, rows.floats(*(f"goal_{name}" for name in POSE)), anchor)
 
 
-@check("routes", needs=("anchors",), after=("list_lengths_differ", "unknown_target"))
+@check("routes", after=("list_lengths_differ", "unknown_target"))
 def end_position(data: SceneData, _rows: Rows) -> Iterator[Finding]:
     """The last position is the target's selected anchor."""
     fit, anchor = _anchor_poses(data, data.goal_of_route)
@@ -155,7 +155,7 @@ def end_position(data: SceneData, _rows: Rows) -> Iterator[Finding]:
     yield from _off(fit, data.paths.ends, anchor)
 
 
-@check("routes", needs=("anchors",), after=("list_lengths_differ", "unknown_target"))
+@check("routes", after=("list_lengths_differ", "unknown_target"))
 def final_yaw(data: SceneData, _rows: Rows) -> Iterator[Finding]:
     """The last yaw is within 7.5° of the anchor's."""
     fit, anchor = _anchor_poses(data, data.goal_of_route)
@@ -180,8 +180,7 @@ def replay_differs(data: SceneData, rows: Rows) -> Iterator[Finding]:
             yield Finding(row, f"pose {step} at {pose_text(poses[step])}", f"{pose_text(flown[step])}")
 
 
-@check("routes", needs=("anchors",), after=("list_lengths_differ", "action_order", "replay_differs", "end_position",
-                                            "unknown_target"))  # fmt: skip
+@check("routes", after=("list_lengths_differ", "action_order", "replay_differs", "end_position", "unknown_target"))
 def stops_far(data: SceneData, _rows: Rows) -> Iterator[Finding]:
     """An agent that flies the actions, which are without the Approach, stops within 1 m of the anchor."""
     paths = data.paths

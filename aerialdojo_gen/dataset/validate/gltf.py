@@ -42,7 +42,7 @@ def _whole(function: Function) -> Function:
     return run
 
 
-@check("scenes", needs=("mesh",), after=MESH_CHECKS)
+@check("scenes", after=MESH_CHECKS)
 @_whole
 def mesh_moved(data: SceneData, _rows: Rows) -> Iterator[Finding]:
     """By glTF's rules every node stands where its vertices say: nothing above it moves, turns or scales it."""
@@ -68,7 +68,7 @@ def mesh_moved(data: SceneData, _rows: Rows) -> Iterator[Finding]:
         yield Finding(0, f"{len(odd):,} nodes that a viewer shows otherwise, {odd[0]} first", "each node once")
 
 
-@check("scenes", needs=("mesh",), after=MESH_CHECKS)
+@check("scenes", after=MESH_CHECKS)
 @_whole
 def mesh_colours(data: SceneData, _rows: Rows) -> Iterator[Finding]:
     """A material's colour is the same by its name, by its extras, by its factor and by its texture."""
@@ -95,7 +95,7 @@ def mesh_colours(data: SceneData, _rows: Rows) -> Iterator[Finding]:
             return
 
 
-@check("scenes", needs=("mesh",), after=MESH_CHECKS)
+@check("scenes", after=MESH_CHECKS)
 @_whole
 def mesh_extent(data: SceneData, _rows: Rows) -> Iterator[Finding]:
     """Vertices are finite and lie within the bounds that the file tells of them; nothing of it lies elsewhere."""
@@ -124,15 +124,15 @@ def mesh_extent(data: SceneData, _rows: Rows) -> Iterator[Finding]:
 def _document(data: SceneData) -> dict[str, Any]:
     """Return the glTF document, read once, of a mesh that can be read."""
     _ = data.mesh
-    document = data.cached("gltf", lambda: _parse(data.mesh_path().read_bytes()))
+
+    def parse() -> Any:
+        raw = data.mesh_path().read_bytes()
+        return json.loads(raw[20 : 20 + struct.unpack_from("<I", raw, 12)[0]])
+
+    document = data.cached("gltf", parse)
     if not isinstance(document, dict):
         raise UncheckedError("no glTF document")
     return document
-
-
-def _parse(raw: bytes) -> Any:
-    (length,) = struct.unpack_from("<I", raw, 12)
-    return json.loads(raw[20 : 20 + length])
 
 
 def _placed(document: dict[str, Any]) -> Iterator[tuple[dict[str, Any], Floats]]:

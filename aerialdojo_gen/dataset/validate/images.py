@@ -57,7 +57,7 @@ _PIXEL, _PIXEL_SHARE = 16, 0.0005
 _CHANNELS = "RGB"
 
 
-@check("objects", needs=("routes",))
+@check("objects")
 def image_missing(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """An object that tasks ask for has a picture."""
     targets = set(data["routes"].ints("target_object_id").tolist())
@@ -104,7 +104,7 @@ def image_box(_data: SceneData, rows: Rows) -> Iterator[Finding]:
             yield Finding(row, f"image_fraction = {fraction[row]:.4g}", "more than 0, no more than the box's share")
 
 
-@check("objects", needs=("anchors", "mesh"), after=("image_missing",))
+@check("objects", after=("image_missing",))
 def image_pose(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A picture is taken from its object's selected anchor, or from behind it with nothing between the two."""
     places = data["anchors"].floats("x_m", "y_m", "z_m", "yaw_rad").reshape(-1, 4)
@@ -127,7 +127,7 @@ def image_pose(data: SceneData, rows: Rows) -> Iterator[Finding]:
             yield Finding(row, found, "free sight")
 
 
-@check("objects", needs=("mesh",), after=(*_WHOLE, "image_box", "object_node", "image_pose"))
+@check("objects", after=(*_WHOLE, "image_box", "object_node", "image_pose"))
 def image_target(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """Box and share of pixels are those of the object as rays from the picture's camera find it."""
     rays = data.rays
@@ -148,7 +148,7 @@ def image_target(data: SceneData, rows: Rows) -> Iterator[Finding]:
             yield Finding(row, f"box ({u0:g}, {v0:g}) to ({u1:g}, {v1:g})", f"one that holds {box}")
 
 
-@check("objects", needs=("mesh",), after=(*_WHOLE, "image_box", "image_target", "object_node", "image_pose"))
+@check("objects", after=(*_WHOLE, "image_box", "image_target", "object_node", "image_pose"))
 def image_tells(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A picture says which of the parts that make its object's name true it does not show."""
     scene = data.mesh
@@ -230,9 +230,7 @@ def image_format(data: SceneData, rows: Rows) -> Iterator[Finding]:
             yield Finding(row, f"{size[0]} x {size[1]} pixels", f"{config.width} x {config.height}")
 
 
-@check(
-    "objects", needs=("mesh",), after=(*_WHOLE, "image_blank", "image_format", "image_pose"), samples=True,
-)  # fmt: skip
+@check("objects", after=(*_WHOLE, "image_blank", "image_format", "image_pose"), samples=True)
 def image_redrawn(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A picture is what its camera sees, as rendered again: no other's, no channel swapped."""
     pictures = rows.column("reference_image")

@@ -12,6 +12,7 @@ import hashlib
 import re
 import zlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -58,7 +59,7 @@ def telling_id(data: SceneData, rows: Rows) -> Iterator[Finding]:
             yield Finding(row, f"reference_image_id = {image!r}", "ref_<12 hexadecimal digits>")
 
 
-@check("tasks", needs=("objects",))
+@check("tasks")
 def telling_text(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """Names and descriptions hold no coordinate and no node of the mesh."""
     nodes = {node for node in data["objects"].texts("mesh_node") if node and re.search(r"_\d+$", node)}
@@ -73,7 +74,7 @@ def telling_text(data: SceneData, rows: Rows) -> Iterator[Finding]:
                 yield Finding(row, f"{name} tells {judged[text]!r}", "words alone")
 
 
-@check("tasks", needs=("routes", "objects"))
+@check("tasks")
 def telling_number(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """No number of a task's row is a coordinate of its goal or of its target, unless the start shares it."""
     goals = data["routes"].floats("goal_x_m", "goal_y_m", "goal_z_m").reshape(-1, 3)
@@ -128,7 +129,7 @@ def image_id_of_salt(data: SceneData, rows: Rows) -> Iterator[Finding]:
     yield from _unlike(rows.texts("reference_image_id"), expected)
 
 
-@check("routes", needs=("objects",), after=("duplicate_key", "unknown_target", "nav_id_guessed", "nav_id_of_salt"))
+@check("routes", after=("duplicate_key", "unknown_target", "nav_id_guessed", "nav_id_of_salt"))
 def telling_digits(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """Digits and order of nav_ids are independent of target, start, landmark, direction, category and length."""
     fit = np.flatnonzero(rows.judged)
@@ -147,15 +148,15 @@ def telling_digits(data: SceneData, rows: Rows) -> Iterator[Finding]:
     backwards = np.argsort(np.array([text[::-1] for text in digits]), kind="stable")
     parts = {f"digit {k + 1}": _codes([text[k : k + 1] for text in digits]) for k in range(_DIGITS)}
     parts |= {f"digits {k + 1} and {k + 2}": _codes([text[k : k + 2] for text in digits]) for k in (0, _DIGITS - 2)}
+    tests = {words: partial(_shared, part) for words, part in parts.items()}
+    tests |= {"order": partial(_neighbours, order), "order from the end": partial(_neighbours, backwards)}
     for name, secret in secrets.items():
-        tests = {words: _shared(part, secret) for words, part in parts.items()}
-        tests |= {"order": _neighbours(order, secret), "order from the end": _neighbours(backwards, secret)}
         for words, statistic in tests.items():
             rng = generator(0, "validate", data.scene, name, words)
-            drawn = [statistic(rng.permutation(len(secret))) for _ in range(_DRAWINGS)]
+            drawn = [statistic(secret[rng.permutation(len(secret))]) for _ in range(_DRAWINGS)]
             # Counts that hardly vary by chance are given the deviation of a count.
             deviation = max(float(np.std(drawn)), float(np.sqrt(np.mean(drawn))), 1.0)
-            off = (statistic(np.arange(len(secret))) - float(np.mean(drawn))) / deviation
+            off = (statistic(secret) - float(np.mean(drawn))) / deviation
             if off > _DEVIATIONS:
                 found = f"nav_ids whose {words} goes with {name}, {off:.0f} standard deviations above chance"
                 yield Finding(int(fit[0]), found, f"{_DEVIATIONS:g} at most, as of digits that were drawn")
@@ -186,22 +187,12 @@ def _codes(values: Iterable[object]) -> Ints:
     return np.array([known.setdefault(value, len(known)) for value in values], dtype=np.int64)
 
 
-def _shared(part: Ints, secret: Ints) -> Callable[[Ints], float]:
-    """Pairs of rows that share both a part of their ids and a secret, by how the secrets are dealt out."""
-    width = int(secret.max(initial=0)) + 1
-
-    def count(dealt: Ints) -> float:
-        cells = np.bincount(part * width + secret[dealt]).astype(np.float64)
-        return float((cells * (cells - 1)).sum() / 2)
-
-    return count
+def _shared(part: Ints, secret: Ints) -> float:
+    """Pairs of rows that share both a part of their ids and a secret."""
+    cells = np.bincount(part * (int(secret.max(initial=0)) + 1) + secret).astype(np.float64)
+    return float((cells * (cells - 1)).sum() / 2)
 
 
-def _neighbours(order: Ints, secret: Ints) -> Callable[[Ints], float]:
-    """Ids next to each other in their order that share a secret, by how the secrets are dealt out."""
-
-    def count(dealt: Ints) -> float:
-        sorted_secrets = secret[dealt][order]
-        return float((sorted_secrets[1:] == sorted_secrets[:-1]).sum())
-
-    return count
+def _neighbours(order: Ints, secret: Ints) -> float:
+    """Ids next to each other in their order that share a secret."""
+    return float((np.diff(secret[order]) == 0).sum())

@@ -31,7 +31,7 @@ _HANGS_M = 0.5  # with less air below, a thing was meant to stand
 _ASIDE_M = 0.1  # so far aside of what it rests on may its middle be
 
 
-@check("scenes", needs=("mesh",))
+@check("scenes")
 def mesh_outside(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A mesh's path stays in the data directory."""
     data.require_meshes()
@@ -45,7 +45,7 @@ def mesh_outside(data: SceneData, rows: Rows) -> Iterator[Finding]:
         yield Finding(0, f"mesh_path = {stored_path!r}", "a path below the data directory")
 
 
-@check("scenes", needs=("mesh",), after=("mesh_outside",))
+@check("scenes", after=("mesh_outside",))
 def mesh_missing(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """Every scene's mesh is there."""
     data.require_meshes()
@@ -59,7 +59,7 @@ def mesh_missing(data: SceneData, rows: Rows) -> Iterator[Finding]:
     yield Finding(0, f"no file {place}", "the mesh (elsewhere: --meshes DIR; none: --no-meshes)")
 
 
-@check("scenes", needs=("mesh",), after=("mesh_outside", "mesh_missing"))
+@check("scenes", after=("mesh_outside", "mesh_missing"))
 def mesh_digest(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A mesh's bytes have the SHA-256 of its scene."""
     data.require_meshes()
@@ -71,7 +71,7 @@ def mesh_digest(data: SceneData, rows: Rows) -> Iterator[Finding]:
         yield Finding(0, f"SHA-256 {digest}", str(rows.texts("mesh_sha256")[0]))
 
 
-@check("scenes", needs=("mesh",), after=("mesh_outside", "mesh_missing", "mesh_digest"))
+@check("scenes", after=("mesh_outside", "mesh_missing", "mesh_digest"))
 def mesh_damaged(data: SceneData, _rows: Rows) -> Iterator[Finding]:
     """A mesh is a scene file that can be read."""
     try:
@@ -80,7 +80,7 @@ def mesh_damaged(data: SceneData, _rows: Rows) -> Iterator[Finding]:
         yield Finding(0, str(error), "a scene that build-scenes wrote")
 
 
-@check("scenes", needs=("mesh",), after=MESH_CHECKS)
+@check("scenes", after=MESH_CHECKS)
 def scene_of_mesh(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """What the scene's row says is so in its mesh."""
     stored = rows.table.to_pylist()[0]
@@ -92,37 +92,37 @@ def scene_of_mesh(data: SceneData, rows: Rows) -> Iterator[Finding]:
             yield Finding(0, f"{name} = {own}", str(value))
 
 
-@check("objects", needs=("mesh",))
+@check("objects")
 def object_node(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """An object's node exists in the mesh."""
     yield from _unknown_nodes(data, rows)
 
 
-@check("landmarks", needs=("mesh",))
+@check("landmarks")
 def landmark_node(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A landmark's node exists in the mesh."""
     yield from _unknown_nodes(data, rows)
 
 
-@check("objects", needs=("mesh",), after=("object_node",))
+@check("objects", after=("object_node",))
 def object_box(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """An object's centre and size are those of its node's box."""
     yield from _other_box(data, rows, rows.floats("size_x_m", "size_y_m", "size_z_m"))
 
 
-@check("objects", needs=("mesh",), after=("object_node",))
+@check("objects", after=("object_node",))
 def object_category(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """An object's category is its node's."""
     yield from _unlike_node(data, rows, "category")
 
 
-@check("objects", needs=("mesh",), after=("object_node",))
+@check("objects", after=("object_node",))
 def object_shape(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """An object's shape is its node's."""
     yield from _unlike_node(data, rows, "shape")
 
 
-@check("landmarks", needs=("mesh",), after=("landmark_node",))
+@check("landmarks", after=("landmark_node",))
 def landmark_box(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A landmark's centre is that of its node's box."""
     yield from _other_box(data, rows, None)
@@ -156,7 +156,7 @@ def _other_box(data: SceneData, rows: Rows, size: np.ndarray | None) -> Iterator
             yield Finding(row, f"size {place_text(size[row], 4)}", place_text(high - low, 4))
 
 
-@check("scenes", needs=("mesh",), after=MESH_CHECKS)
+@check("scenes", after=MESH_CHECKS)
 def thing_hovers(data: SceneData, _rows: Rows) -> Iterator[Finding]:
     """Nothing hovers: all that is in a scene touches the rest of it, and its things rest on something or hang."""
     scene = data.mesh

@@ -47,19 +47,19 @@ _STEP_M = 0.5
 _MAX_NODES = 1_000_000
 
 
-@check("anchors", needs=("mesh",))
+@check("anchors")
 def anchor_below_ground(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """An anchor is above the ground."""
     yield from _buried(data, rows.floats("x_m", "y_m", "z_m"))
 
 
-@check("routes", needs=("mesh",))
+@check("routes")
 def goal_below_ground(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A goal is above the ground."""
     yield from _buried(data, rows.floats("goal_x_m", "goal_y_m", "goal_z_m"))
 
 
-@check("routes", needs=("mesh",), after=("list_lengths_differ", "out_of_bounds"))
+@check("routes", after=("list_lengths_differ", "out_of_bounds"))
 def route_below_ground(data: SceneData, _rows: Rows) -> Iterator[Finding]:
     """A route stays above the ground, between its poses too."""
     ground = _ground(data)
@@ -173,7 +173,7 @@ def _open_bodies(instance: Instance) -> list[trimesh.Trimesh]:
 
 
 # Positions in a wall or below ground are reported by other checks.
-@check("anchors", needs=("mesh",), after=("anchor_surface", "anchor_clearance", "anchor_below_ground"))
+@check("anchors", after=("anchor_surface", "anchor_clearance", "anchor_below_ground"))
 def anchor_shut_in(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """From an anchor there is a free way to the open sky."""
     yield from _shut_in(data, rows.floats("x_m", "y_m", "z_m"))
@@ -181,7 +181,6 @@ def anchor_shut_in(data: SceneData, rows: Rows) -> Iterator[Finding]:
 
 @check(
     "routes",
-    needs=("mesh",),
     after=("list_lengths_differ", "out_of_bounds", "start_anchor", "route_collision", "route_below_ground"),
 )
 def route_shut_in(data: SceneData, _rows: Rows) -> Iterator[Finding]:
@@ -224,10 +223,10 @@ def _by_routes(data: SceneData, places: Floats) -> Mask:
     """Whether places lie on routes that somewhere come under the open sky."""
     paths = data.paths
     found = np.zeros(len(places), dtype=np.bool_)
-    for ends in (paths.starts, paths.ends):
-        for k, place in enumerate(places):
-            for route in np.flatnonzero(np.abs(ends[:, :3] - place).max(axis=1) <= 1e-3)[:20]:
-                found[k] = found[k] or bool(open_above(data.rays, paths.xyz[paths.of(int(route))]).any())
+    for k, place in enumerate(places):
+        at = (np.abs(ends[:, :3] - place).max(axis=1) <= 1e-3 for ends in (paths.starts, paths.ends))
+        routes = (int(route) for near in at for route in np.flatnonzero(near)[:20])
+        found[k] = any(open_above(data.rays, paths.xyz[paths.of(route)]).any() for route in routes)
     return found
 
 

@@ -164,9 +164,13 @@ class Paths:
 
     fit: Mask  # (n,); whether a route has lists of one length, of two poses or more
     first: Ints  # (n + 1,) int64; where each route's poses begin
-    xyz: Floats  # (m, 3) float64; positions, world frame
-    yaw: Floats  # (m,) float64
+    pose: Floats  # (m, 4) float64; positions, world frame, and yaw
     action: Ints  # (m,) int64; what is done at every pose
+
+    @cached_property
+    def xyz(self) -> Floats:
+        """Positions, (m, 3) float64."""
+        return np.ascontiguousarray(self.pose[:, :3])
 
     def of(self, row: int) -> slice:
         """Where a route's poses lie."""
@@ -174,7 +178,7 @@ class Paths:
 
     def poses(self, row: int) -> Floats:
         """Poses of a route, (k, 4) float64."""
-        return np.column_stack([self.xyz[self.of(row)], self.yaw[self.of(row)]])
+        return self.pose[self.of(row)]
 
     def route_of(self, poses: Ints) -> Ints:
         """Rows of the routes that poses belong to."""
@@ -189,14 +193,12 @@ class Paths:
     @cached_property
     def starts(self) -> Floats:
         """First poses, (n, 4) float64."""
-        first = self.first[:-1][self.fit]
-        return self._spread(np.column_stack([self.xyz[first], self.yaw[first]]))
+        return self._spread(self.pose[self.first[:-1][self.fit]])
 
     @cached_property
     def ends(self) -> Floats:
         """Last poses, (n, 4) float64."""
-        last = self.first[1:][self.fit] - 1
-        return self._spread(np.column_stack([self.xyz[last], self.yaw[last]]))
+        return self._spread(self.pose[self.first[1:][self.fit] - 1])
 
     def sums(self, values: Floats) -> Floats:
         """Add up what each pose has, (m,), by route, (n,)."""
@@ -216,21 +218,6 @@ class Paths:
         return np.asarray(np.linalg.norm(self.ends[:, :3] - self.starts[:, :3], axis=1))
 
 
-def paths_of(routes: Rows) -> Paths:
-    """Lay out the poses of a scene's routes."""
-    lengths = routes.list_lengths()
-    fit = (lengths == lengths[:, :1]).all(axis=1) & (lengths[:, 0] >= 2)
-    table = routes.table.filter(pa.array(fit)) if not fit.all() else routes.table
-    flat = {}
-    for name in LISTS:
-        values = pc.list_flatten(table.column(name))
-        flat[name] = values.to_numpy(zero_copy_only=False) if len(values) else np.empty(0)
-    first = np.concatenate([[0], np.cumsum(np.where(fit, lengths[:, 0], 0))]).astype(np.int64)
-    xyz = np.column_stack([flat[name] for name in LISTS[:3]]).astype(np.float64)
-    action = np.nan_to_num(flat["action"], nan=-1).astype(np.int64)
-    return Paths(fit, first, xyz, flat["yaw_rad"].astype(np.float64), action)
-
-
 @dataclass(eq=False)
 class SceneData:
     """One scene of a release, as the checks get it."""
@@ -247,17 +234,26 @@ class SceneData:
     cache: dict[str, Any] = field(default_factory=dict)
 
     def __getitem__(self, name: str) -> Rows:
-        """Return a table's rows."""
+        """Return a table's rows; `UncheckedError` where they cannot be read."""
+        if name not in self.tables:
+            raise UncheckedError(f"{name} cannot be read")
         return self.tables[name]
 
     @cached_property
     def paths(self) -> Paths:
         """Poses of the routes."""
-        return paths_of(self.tables["routes"])
+        lengths = self["routes"].list_lengths()
+        fit = (lengths == lengths[:, :1]).all(axis=1) & (lengths[:, 0] >= 2)
+        table = self["routes"].table.filter(pa.array(fit))
+        lists = [pc.list_flatten(table.column(name)) for name in LISTS]
+        *pose, action = (part.to_numpy(zero_copy_only=False) if len(part) else np.empty(0) for part in lists)
+        first = np.concatenate([[0], np.cumsum(np.where(fit, lengths[:, 0], 0))]).astype(np.int64)
+        action = np.nan_to_num(action, nan=-1).astype(np.int64)
+        return Paths(fit, first, np.column_stack(pose).astype(np.float64), action)
 
     def flagged(self, table: str, checks: Sequence[str]) -> Mask:
         """Rows of a table that one of these checks found fault with, (n,) bool."""
-        mask = np.zeros(len(self.tables[table]), dtype=np.bool_)
+        mask = np.zeros(len(self[table]), dtype=np.bool_)
         for name in checks:
             if (table, name) in self.faulty:
                 mask |= self.faulty[table, name]

@@ -159,14 +159,14 @@ def _in_both(rows: Rows) -> Iterator[Finding]:
             yield Finding(row, f"{nav_ids[row]} stands in {rows.part(first)} too", "one side of the split")
 
 
-@check("objects", needs=("landmarks",))
+@check("objects")
 def unknown_landmark(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """An object's landmark exists."""
     landmarks = data["landmarks"].find("landmark_id", rows.column("landmark_id"))
     yield from _unknown(rows, landmarks, "landmark_id", "a landmark")
 
 
-@check("objects", needs=("landmarks",), after=("unknown_landmark",))
+@check("objects", after=("unknown_landmark",))
 def landmark_nearest(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """An object's landmark is the nearest in the plane."""
     landmarks = data["landmarks"]
@@ -180,7 +180,7 @@ def landmark_nearest(data: SceneData, rows: Rows) -> Iterator[Finding]:
         yield Finding(int(row), f"landmark_id = {ids[own[row]]}", f"{nearest}, which is nearer")
 
 
-@check("objects", needs=("landmarks",), after=("unknown_landmark",))
+@check("objects", after=("unknown_landmark",))
 def landmark_direction(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """An object's direction is the one from its landmark."""
     landmarks = data["landmarks"]
@@ -192,19 +192,19 @@ def landmark_direction(data: SceneData, rows: Rows) -> Iterator[Finding]:
             yield Finding(row, str(stated), actual)
 
 
-@check("anchors", needs=("objects",))
+@check("anchors")
 def unknown_object(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """An anchor's object exists."""
     yield from _unknown(rows, data.objects_of(rows), "object_id", "an object")
 
 
-@check("viewpoints", needs=("objects",))
+@check("viewpoints")
 def viewpoint_object(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A viewpoint is one of an object that there is."""
     yield from _unknown(rows, data.objects_of(rows), "object_id", "an object")
 
 
-@check("objects", needs=("anchors",))
+@check("objects")
 def selected_anchor(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """An object with anchors has exactly one that is selected."""
     anchors = data["anchors"]
@@ -216,7 +216,7 @@ def selected_anchor(data: SceneData, rows: Rows) -> Iterator[Finding]:
             yield Finding(row, f"{selected[object_id]} selected anchors", "1")
 
 
-@check("routes", needs=("objects",))
+@check("routes")
 def unknown_target(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A route's target exists."""
     yield from _unknown(rows, data.target_of_route, "target_object_id", "an object")
@@ -229,7 +229,7 @@ def _unknown(rows: Rows, found: Ints, name: str, what: str) -> Iterator[Finding]
         yield Finding(row, f"{name} = {ids[row]}", f"{what} of the scene")
 
 
-@check("routes", needs=("anchors",))
+@check("routes")
 def unknown_start(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A route's start anchor exists."""
     for row in np.flatnonzero(data.start_of_route < 0):
@@ -237,14 +237,14 @@ def unknown_start(data: SceneData, rows: Rows) -> Iterator[Finding]:
         yield Finding(int(row), start, "an anchor of the scene")
 
 
-@check("routes", needs=("tasks",))
+@check("routes")
 def route_without_task(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A route has its task instances."""
     for row in np.flatnonzero(data["tasks"].find("nav_id", rows.column("nav_id")) < 0):
         yield Finding(int(row), "no row of tasks", "two instances")
 
 
-@check("tasks", needs=("routes",), after=("duplicate_key", "task_in_both_subsets"))
+@check("tasks", after=("duplicate_key", "task_in_both_subsets"))
 def task_without_route(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A task has its route, on the same side of the split."""
     routes = data["routes"]
@@ -277,7 +277,7 @@ def task_instances(data: SceneData, rows: Rows) -> Iterator[Finding]:
             yield Finding(first[nav_id], " and ".join(sorted(modalities)), "image and semantic")
 
 
-@check("tasks", needs=("scenes",))
+@check("tasks")
 def task_scene(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A task's family, scene type and partition are its scene's."""
     scenes = data["scenes"]
@@ -289,7 +289,7 @@ def task_scene(data: SceneData, rows: Rows) -> Iterator[Finding]:
             yield Finding(int(row), f"{name} = {own[row]!r}", repr(expected))
 
 
-@check("tasks", needs=("routes",))
+@check("tasks")
 def task_setting(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A task's setting is its route's."""
     theirs, fit = data["routes"].take("setting", data.route_of_task), data.comparable("routes", data.route_of_task)
@@ -306,7 +306,7 @@ def task_budget(data: SceneData, rows: Rows) -> Iterator[Finding]:
         yield Finding(int(row), str(own[row]), str(expected[row]))
 
 
-@check("tasks", needs=("routes",), after=("telling_number",))
+@check("tasks", after=("telling_number",))
 def task_start(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A task starts at the first pose of its route."""
     own, theirs = rows.floats(*START), at(data.paths.starts, data.route_of_task)
@@ -325,7 +325,7 @@ def goal_of_modality(_data: SceneData, rows: Rows) -> Iterator[Finding]:
                 yield Finding(row, f"{name} = {value!r} in a {own} task", "a text" if own == expected else "null")
 
 
-@check("tasks", needs=("routes", "objects", "landmarks"), after=("goal_of_modality", "telling_text", "telling_id"))
+@check("tasks", after=("goal_of_modality", "telling_text", "telling_id"))
 def task_goal(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """What a task says of its goal is what stands of the target in objects."""
     objects, landmarks = data["objects"], data["landmarks"]
@@ -350,7 +350,7 @@ def task_goal(data: SceneData, rows: Rows) -> Iterator[Finding]:
             yield Finding(row, f"{name} = {own!r}", repr(expected))
 
 
-@check("tasks", needs=("routes", "objects"), after=("goal_of_modality", "telling_text", "telling_id"))
+@check("tasks", after=("goal_of_modality", "telling_text", "telling_id"))
 def task_text(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A task's description is one of its target's, and `frame_seen_in_train` says whether that is not held out."""
     objects, target = data["objects"], data.target_of_task

@@ -5,12 +5,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from aerialdojo_gen.dataset.stats.figures.charts import composition, detours, difficulty, lengths, shares
+from aerialdojo_gen.dataset.stats.figures.charts import (
+    categories,
+    composition,
+    detours,
+    difficulty,
+    lengths,
+    names,
+    shares,
+)
 from aerialdojo_gen.dataset.stats.figures.maps import maps
-from aerialdojo_gen.dataset.stats.figures.ranking import categories, names
 from aerialdojo_gen.dataset.stats.figures.style import save
-from aerialdojo_gen.dataset.stats.frames import read_tasks
-from aerialdojo_gen.dataset.stats.measures import has_difficulty
+from aerialdojo_gen.dataset.stats.measures import has_difficulty, read_tasks
 from aerialdojo_gen.store.root import Where, open_root
 
 __all__ = ["draw_figures"]
