@@ -127,25 +127,20 @@ def _field(table: str, name: str, about: Document, kind: Document, source: Docum
     return own | about | kind | {"source": {"fileSet": {"@id": f"{table}-files"}} | source}
 
 
-def _column(table: str, field: pa.Field) -> Document:
-    about = {"description": meaning(field) + (f"; unit: {unit(field)}" if unit(field) else "")}
-    kind, repeated = _kind(field)
+def _column(table: str, field: pa.Field, within: str = "") -> Document:
+    """Describe a column, or a part of the structures within one."""
+    is_list = pa.types.is_list(field.type)
+    kind = field.type.value_type if is_list else field.type
     if pa.types.is_struct(kind):
-        shape: Document = {"subField": [_sub_field(table, field.name, part) for part in kind]}
+        shape: Document = {"subField": [_column(table, part, field.name) for part in kind]}
     else:
         shape = {"dataType": _TYPES[kind]}
-    return _field(table, field.name, about, shape | repeated, {"extract": {"column": field.name}})
-
-
-def _sub_field(table: str, column: str, field: pa.Field) -> Document:
-    kind, repeated = _kind(field)
-    source = {"extract": {"column": column}, "transform": {"jsonPath": field.name}}
-    return _field(table, f"{column}/{field.name}", {}, {"dataType": _TYPES[kind]} | repeated, source)
-
-
-def _kind(field: pa.Field) -> tuple[pa.DataType, Document]:
-    """Type of a field's values, and what says that there are several."""
-    return (field.type.value_type, {"repeated": True}) if pa.types.is_list(field.type) else (field.type, {})
+    shape |= {"repeated": True} if is_list else {}
+    if within:
+        source = {"extract": {"column": within}, "transform": {"jsonPath": field.name}}
+        return _field(table, f"{within}/{field.name}", {}, shape, source)
+    about = {"description": meaning(field) + (f"; unit: {unit(field)}" if unit(field) else "")}
+    return _field(table, field.name, about, shape, {"extract": {"column": field.name}})
 
 
 def write_croissant(data: Where) -> None:

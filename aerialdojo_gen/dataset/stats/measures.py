@@ -16,11 +16,12 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.base.constants import DETOUR
 from aerialdojo_gen.dataset.stats.comparison import Column, Comparison, Figure, Row
+from aerialdojo_gen.dataset.stats.tables import SETTING_NAMES, family_order
 from aerialdojo_gen.geometry.motion import DISPLACEMENTS, TURNS
 from aerialdojo_gen.geometry.part_visibility import FRONT_RAD
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import Where, open_root
-from aerialdojo_gen.store.schemas import FAMILIES, SETTINGS, SPLIT_COLUMNS
+from aerialdojo_gen.store.schemas import SPLIT_COLUMNS
 
 # Before the goal the camera should see it, whichever way the drone goes.
 _ARRIVAL_M = 3.0
@@ -81,9 +82,6 @@ def read_goals(data: Where, scenes: Sequence[str]) -> pd.DataFrame:
     return pd.concat(parts, ignore_index=True)
 
 
-SETTING_ROWS = dict(zip(SETTINGS, ("base", "standard", "long-horizon"), strict=True))
-
-
 class Measure(NamedTuple):
     """A column of a table, and how its figure is taken of a group of rows."""
 
@@ -133,7 +131,7 @@ def _count(*conditions: tuple[str, object]) -> Callable[[pd.DataFrame], Figure]:
 
 
 def _by_setting(tasks: pd.DataFrame) -> dict[str, pd.DataFrame]:
-    return {name: tasks[tasks["setting"] == s] for s, name in SETTING_ROWS.items()} | {"all": tasks}
+    return {name: tasks[tasks["setting"] == s] for s, name in SETTING_NAMES.items()} | {"all": tasks}
 
 
 # The last two are of the table by setting alone: scenes fit a terminal without them.
@@ -193,7 +191,7 @@ def held_out_table(tasks: pd.DataFrame) -> Comparison:
     """Count the split by objects."""
     measures = (
         Measure("tasks", len),
-        *(Measure(name.replace("-horizon", ""), _count(("setting", s))) for s, name in SETTING_ROWS.items()),
+        *(Measure(name.replace("-horizon", ""), _count(("setting", s))) for s, name in SETTING_NAMES.items()),
         Measure("new target", _count(("target_held_out", 1.0))),
         Measure("new start", _count(("start_held_out", 1.0))),
         Measure("new both", _count(("target_held_out", 1.0), ("start_held_out", 1.0))),
@@ -230,8 +228,7 @@ def goal_table(goals: pd.DataFrame) -> Comparison:
         Measure("framed %", _share_of_known("part_framed"), "%"),
         Measure("back m", _quantile("step_back_m", 0.5), "m", 2),
     )
-    there = sorted(set(goals["family"]), key=lambda name: ([*FAMILIES.values(), name].index(name), name))
-    groups = {name: goals[goals["family"] == name] for name in there} | {"all": goals}
+    groups = {name: goals[goals["family"] == name] for name in family_order(goals["family"])} | {"all": goals}
     notes = (
         "fronts: objects with a front; front: of those, seen from within 60° of it.",
         "parts: of the objects that parts tell, those whose reference picture shows",

@@ -12,10 +12,10 @@ from aerialdojo_gen.dataset.stats.figures.charts import (
     difficulty,
     lengths,
     names,
+    save,
     shares,
 )
 from aerialdojo_gen.dataset.stats.figures.maps import maps
-from aerialdojo_gen.dataset.stats.figures.style import save
 from aerialdojo_gen.dataset.stats.measures import has_difficulty, read_tasks
 from aerialdojo_gen.store.root import Where, open_root
 

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from aerialdojo_gen.dataset.stats.figures.style import WIDTH_IN, styled
+from aerialdojo_gen.dataset.stats.figures.charts import WIDTH_IN, styled
 from aerialdojo_gen.rendering.orthographic import OrthographicPictures
 from aerialdojo_gen.scenes.glb import read_glb
 from aerialdojo_gen.scenes.stored import mesh_copy
@@ -81,13 +81,10 @@ def _map(axes: Axes, root: DataRoot, row: dict[str, Any]) -> None:
     for table, kind in (("anchors", "anchor"), ("objects", "object"), ("landmarks", "landmark")):
         places = store.read_scene(root, f"release/{table}", scene, ["x_m", "y_m"])
         axes.plot(places["x_m"].to_numpy(), places["y_m"].to_numpy(), ls="none", **_MARKS[kind])
-    axes.set_xlim(west, east)
-    axes.set_ylim(south, north)
-    axes.set_xticks([])
-    axes.set_yticks([])
+    axes.set(xlim=(west, east), ylim=(south, north), xticks=[], yticks=[])
     for spine in axes.spines.values():
         spine.set(visible=True, linewidth=0.4, color="#888888")
-    axes.set_title(scene, fontsize=5.5, pad=1.5)
+    axes.set_title(scene, loc="center", fontsize=5.5, pad=1.5)
     reach = _round_length((east - west) / 3)
     x, y = west + 0.05 * (east - west), south + 0.06 * (north - south)
     axes.plot([x, x + reach], [y, y], color="white", lw=2.2, solid_capstyle="butt")
