@@ -116,23 +116,26 @@ def test_the_flight_volume_ends_at_each_of_its_six_sides(data, axis, place):
         assert found == []
 
 
-@pytest.mark.parametrize(("degrees", "off"), [(-7.6, True), (-7.4, False), (7.4, False), (7.6, True), (179, True)])
-def test_the_last_yaw_may_be_half_a_turn_of_15_degrees_off(data, degrees, off):
-    def change(row):
-        row["yaw_rad"][-1] = row["goal_yaw_rad"] + math.radians(degrees)
-
-    planted, found = judged(data, "final_yaw", "routes", change)
-    assert found == (planted if off else [])
+def ending_turned(degrees):
+    return lambda row: put("yaw_rad", row["goal_yaw_rad"] + math.radians(degrees), 1)(row)
 
 
-@pytest.mark.parametrize(("metres", "far"), [(1.001, True), (0.999, False)])
-def test_an_approach_may_be_a_metre_long(data, metres, far):
-    def change(row):
-        for name in PLACES:
-            row[name][-2] = row[f"goal_{name}"] + metres / math.sqrt(3)
+def approaching_from(metres):
+    return lambda row: [row[name].__setitem__(-2, row[f"goal_{name}"] + metres / math.sqrt(3)) for name in PLACES]
 
-    planted, found = judged(data, "stops_far", "routes", change, approaches)
-    assert found == (planted if far else [])
+
+# The last yaw may be half a turn of 15 degrees off, and an Approach a metre long.
+EDGES = [
+    *(("final_yaw", ending_turned(off), lambda _: True, abs(off) > 7.5) for off in (-7.6, -7.4, 7.4, 7.6, 179)),
+    *(("stops_far", approaching_from(metres), approaches, metres > 1.0) for metres in (1.001, 0.999)),
+]
+
+
+@pytest.mark.parametrize("edge", EDGES, ids=lambda edge: f"{edge[0]}-{EDGES.index(edge)}")
+def test_what_is_just_beyond_a_limit_is_found_and_what_is_just_within_it_is_not(data, edge):
+    name, change, wanted, beyond = edge
+    planted, found = judged(data, name, "routes", change, wanted)
+    assert found == (planted if beyond else [])
 
 
 @pytest.mark.parametrize("metres", [-0.1, 0.1])

@@ -69,88 +69,57 @@ OF_TASKS = (
 )
 
 
-def tells_the_goals_place(planted, nav_id):
-    route = next(filter(of_nav(nav_id), planted.rows(ROUTES)))
-    return {"telling_number": task_keys([planted.edit(TRAIN, put("start_x_m", route["goal_x_m"]), of_nav(nav_id))])}
+def renamed(tasks, route, nav_id):
+    """The rows of a navigation task under another name."""
+    named_so = [task | {"nav_id": nav_id, "task_id": f"{nav_id}-{task['modality'][0]}"} for task in tasks]
+    return named_so, route | {"nav_id": nav_id}
 
 
-def stands_twice(planted, nav_id):
-    rows = planted.rows(TRAIN)
-    again = next(filter(of_nav(nav_id), rows))
-    planted.write(TRAIN, [*rows, again])
-    return {"duplicate_key": task_keys([again])}
+def with_two_names(tasks, route):
+    others, again = renamed(tasks, route, f"{route['scene']}-ffffffffffff")
+    return {TRAIN: [*tasks, *others], ROUTES: [route, again]}, [named(ROUTES, again)]
 
 
-def lacks_an_instance(planted, nav_id):
-    rows = planted.rows(TRAIN)
-    lost, left = filter(of_nav(nav_id), rows)
-    planted.write(TRAIN, [row for row in rows if row != lost])
-    return {"task_instances": task_keys([left])}
+def named_after_its_pair(tasks, route):
+    pair = f"{route['start_object_id']}_{route['start_anchor_id']}__{route['target_object_id']}"
+    others, again = renamed(tasks, route, f"{route['scene']}-{pair}")
+    return {TRAIN: others, ROUTES: [again]}, task_keys(others)
 
 
-def trains_and_tests(planted, nav_id):
-    both = [row | {"subset": "test"} for row in filter(of_nav(nav_id), planted.rows(TRAIN))]
-    planted.write("tasks/test", [*planted.rows("tasks/test"), *both])
-    return {"task_in_both_subsets": task_keys(both)}
+def at_the_goals_place(tasks, route):
+    there = tasks[0] | {"start_x_m": route["goal_x_m"]}
+    return {TRAIN: [there, *tasks[1:]]}, task_keys([there])
 
 
-def has_a_route_that_trains_and_tests(planted, nav_id):
-    route = next(filter(of_nav(nav_id), planted.rows(ROUTES)))
-    planted.write("routes/test", [*planted.rows("routes/test"), route])
-    return {"route_in_both_subsets": [named(ROUTES, route)]}
+def on_both_sides(tasks, _route):
+    both = [task | {"subset": "test"} for task in tasks]
+    return {TRAIN: tasks, "tasks/test": both}, task_keys(both)
 
 
-def has_no_route(planted, nav_id):
-    planted.write(ROUTES, [row for row in planted.rows(ROUTES) if row["nav_id"] != nav_id])
-    return {"task_without_route": task_keys(filter(of_nav(nav_id), planted.rows(TRAIN)))}
-
-
-def is_a_route_alone(planted, nav_id):
-    planted.write(TRAIN, [row for row in planted.rows(TRAIN) if row["nav_id"] != nav_id])
-    return {"route_without_task": [f"nav_id={nav_id}"]}
-
-
-def has_its_route_on_the_other_side(planted, nav_id):
-    routes = planted.rows(ROUTES)
-    planted.write("routes/test", [*planted.rows("routes/test"), *filter(of_nav(nav_id), routes)])
-    planted.write(ROUTES, [row for row in routes if row["nav_id"] != nav_id])
-    return {"task_without_route": task_keys(filter(of_nav(nav_id), planted.rows(TRAIN)))}
-
-
-def has_two_names(planted, nav_id):
-    again = f"{planted.scene}-ffffffffffff"
-    for key in (ROUTES, TRAIN):
-        rows = planted.rows(key)
-        copies = [row | {"nav_id": again} for row in filter(of_nav(nav_id), rows)]
-        for row in copies if key == TRAIN else ():
-            row["task_id"] = f"{again}-{row['modality'][0]}"
-        planted.write(key, [*rows, *copies])
-    return {"duplicate_route": [f"nav_id={again}"]}
-
-
-def tells_the_pair_by_its_id(planted, nav_id):
-    row = next(filter(of_nav(nav_id), planted.rows(ROUTES)))
-    telling = f"{planted.scene}-{row['start_object_id']}_{row['start_anchor_id']}__{row['target_object_id']}"
-    planted.edit(ROUTES, put("nav_id", telling), of_nav(nav_id))
-
-    def rename(task):
-        task.update(nav_id=telling, task_id=f"{telling}-{task['modality'][0]}")
-
-    return {"telling_id": task_keys(planted.edit_all(TRAIN, rename, of_nav(nav_id)))}
-
-
+# What finds it, and of a navigation task's instances and route those that stand instead, by part, and who is named.
 OF_SEVERAL_ROWS = (
-    tells_the_goals_place, stands_twice, lacks_an_instance, trains_and_tests, has_a_route_that_trains_and_tests,
-    has_no_route, is_a_route_alone, has_its_route_on_the_other_side, has_two_names, tells_the_pair_by_its_id,
-)  # fmt: skip
+    ("telling_number", at_the_goals_place),
+    ("duplicate_key", lambda tasks, _: ({TRAIN: [*tasks, tasks[0]]}, task_keys(tasks[:1]))),
+    ("task_instances", lambda tasks, _: ({TRAIN: tasks[1:]}, task_keys(tasks[1:]))),
+    ("task_in_both_subsets", on_both_sides),
+    ("route_in_both_subsets", lambda _, route: ({ROUTES: [route], "routes/test": [route]}, [named(ROUTES, route)])),
+    ("task_without_route", lambda tasks, _: ({ROUTES: []}, task_keys(tasks))),
+    ("route_without_task", lambda _, route: ({TRAIN: []}, [named(ROUTES, route)])),
+    ("task_without_route", lambda tasks, route: ({ROUTES: [], "routes/test": [route]}, task_keys(tasks))),
+    ("duplicate_route", with_two_names),
+    ("telling_id", named_after_its_pair),
+)
 
 
 def test_faults_of_tasks_and_routes(planted):
     expected = plant(planted, OF_TASKS)
-    untouched = reversed([row["nav_id"] for row in planted.rows(ROUTES)])
-    for fault in OF_SEVERAL_ROWS:
-        for found_by, keys in fault(planted, next(untouched)).items():
-            expected[found_by] = sorted([*expected.get(found_by, ()), *keys])
+    untouched = reversed(planted.rows(ROUTES))
+    for found_by, change in OF_SEVERAL_ROWS:
+        is_own = of_nav((route := next(untouched))["nav_id"])
+        parts, keys = change([*filter(is_own, planted.rows(TRAIN))], route)
+        for key, rows in parts.items():
+            planted.write(key, [*(row for row in planted.rows(key) if not is_own(row)), *rows])
+        expected[found_by] = sorted([*expected.get(found_by, ()), *keys])
     assert check(planted) == expected
 
 
