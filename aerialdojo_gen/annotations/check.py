@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from aerialdojo_gen.annotations.claims import SceneClaims
 from aerialdojo_gen.annotations.format import Fault, Landmark, Object, Source
 from aerialdojo_gen.annotations.matching import Matcher
-from aerialdojo_gen.annotations.relations import Bearing, SceneGeometry
+from aerialdojo_gen.annotations.relations import Bearing
 from aerialdojo_gen.annotations.vocabulary import Vocabulary
 from aerialdojo_gen.base.names import nearest
 from aerialdojo_gen.base.safe_parse import JsonPath
@@ -37,16 +37,11 @@ class Checked:
     unchecked: Mapping[int, list[str]]  # Words of texts that match no claim, by the object's index in the file
 
 
-def check_source(
-    source: Source,
-    vocabulary: Vocabulary,
-    counts: tuple[int, int] | None = None,
-    geometry: SceneGeometry | None = None,
-) -> Checked:
+def check_source(source: Source, vocabulary: Vocabulary, counts: tuple[int, int] | None = None) -> Checked:
     """Check an annotation file against its scene."""
     if source.document.value is None:
         return Checked(list(source.faults), None, {})
-    checker = _Checker(source, vocabulary, geometry or SceneGeometry(vocabulary.scene))
+    checker = _Checker(source, vocabulary)
     faults = sorted(dict.fromkeys([*source.faults, *checker.faults(counts)]), key=lambda fault: fault.line)
     return Checked(faults, checker.claims, checker.unchecked)
 
@@ -54,9 +49,8 @@ def check_source(
 class _Checker:
     """The checks of one file; each yields its faults."""
 
-    def __init__(self, source: Source, vocabulary: Vocabulary, geometry: SceneGeometry) -> None:
-        self._source, self._scene, self._geometry = source, vocabulary.scene, geometry
-        self._vocabulary = vocabulary
+    def __init__(self, source: Source, vocabulary: Vocabulary) -> None:
+        self._source, self._scene, self._vocabulary = source, vocabulary.scene, vocabulary
         self._fault, self._raw = source.document.fault, source.document.value
         self._known = sorted({*vocabulary.names, *(instance.category for instance in self._scene.instances)})
         self.claims: SceneClaims | None = None
@@ -130,7 +124,7 @@ class _Checker:
 
     def _texts(self) -> Iterator[Fault]:
         """Check directions, texts and that objects can be distinguished; only if all landmarks are valid."""
-        source, scene, geometry = self._source, self._scene, self._geometry
+        source, scene = self._source, self._scene
         landmarks = sorted(source.landmarks.values(), key=lambda entry: entry.id)
         nodes = [landmark.node for landmark in landmarks]
         raw = self._raw.get("landmarks") if isinstance(self._raw, dict) else None
@@ -142,13 +136,13 @@ class _Checker:
             if source.objects:
                 yield self._fault(("landmarks",), "there is none: objects need one to be located by")
             return
-        self.claims = SceneClaims(self._vocabulary, landmarks, geometry)
+        self.claims = SceneClaims(self._vocabulary, landmarks)
         matcher = Matcher(self.claims)
         described: dict[tuple[object, ...], int] = {}
         for k, entry in source.objects.items():
             if entry.node not in scene or entry.node in nodes:
                 continue
-            i = geometry.index[entry.node]
+            i = self.claims.geometry.index[entry.node]
             bearing = self.claims.bearings[i]
             if bearing is None:
                 text = "is exactly at its nearest landmark's position, so it has no direction"
@@ -172,7 +166,7 @@ class _Checker:
         """Check a person's text: what is matched to claims must be so, and fit one thing."""
         assert self.claims is not None
         assert entry.description is not None
-        path, i = ("objects", k, "description"), self._geometry.index[entry.node]
+        path, i = ("objects", k, "description"), self.claims.geometry.index[entry.node]
         for false in matcher.faults(i, entry.description):
             yield self._fault(path, false)
         if words := matcher.read(entry.description, i).unchecked:

@@ -91,11 +91,9 @@ def _mention(raw: Any) -> Mention:
 class SceneClaims:
     """The claims about the instances of one scene."""
 
-    def __init__(
-        self, vocabulary: Vocabulary, landmarks: Sequence[Landmark], geometry: SceneGeometry | None = None
-    ) -> None:
+    def __init__(self, vocabulary: Vocabulary, landmarks: Sequence[Landmark]) -> None:
         self.vocabulary, self.scene = vocabulary, vocabulary.scene
-        self.geometry = geometry or SceneGeometry(self.scene)
+        self.geometry = SceneGeometry.of(self.scene)
         bound = None if self.scene.imported else places_of(self.scene.name)
         self.places = None if bound is None else Places(self.geometry, bound)
         self.landmarks = tuple(self.geometry.index[mark.node] for mark in landmarks)

@@ -176,19 +176,13 @@ class AnnotationDrafter:
 
     def rejection_summary(self) -> str:
         """Return why instances were rejected: ``"; not taken: 7 ..., 2 ..."``; empty if none were."""
-        text = ", ".join(f"{n:,} {why}{self._confusion_text(why)}" for why, n in self.rejections.most_common() if n)
-        return f"; not taken: {text}" if text else ""
-
-    def _confusion_text(self, why: str) -> str:
-        """Return what the first indistinguishable instances were confused with."""
-        if why != _INDISTINGUISHABLE:
-            return ""
-        pairs = [(node, others) for node, others in self.confusions if others][:_SHOWN]
-        text = "; ".join(
+        confused = "; ".join(
             f"{node} with {others[0]}{f' and {len(others) - 1:,} more' if len(others) > 1 else ''}"
-            for node, others in pairs
+            for node, others in [pair for pair in self.confusions if pair[1]][:_SHOWN]
         )
-        return f" ({text})" if text else ""
+        examples = {_INDISTINGUISHABLE: f" ({confused})"} if confused else {}
+        text = ", ".join(f"{n:,} {why}{examples.get(why, '')}" for why, n in self.rejections.most_common() if n)
+        return f"; not taken: {text}" if text else ""
 
     def objects(self, n: int, on_chosen: Callable[[], object] = lambda: None) -> tuple[Object, ...]:
         """Choose up to `n` objects, round-robin over categories; calls `on_chosen` for each."""

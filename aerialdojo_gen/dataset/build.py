@@ -40,6 +40,7 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 DEFAULT_PIPELINE = "aerialdojo-200k.toml"
+_NAMED = 3  # Scenes that are to be made, by name in a table
 
 
 def run_pipeline(
@@ -300,16 +301,9 @@ def _status(stage: Stage, scenes: Sequence[str], pipeline: Pipeline, roots: Proj
 def status_table(found: Sequence[StageStatus]) -> TextTable:
     """Make the table that `status` prints."""
     columns = [Column("fresh"), Column("stale"), Column("missing"), Column("to be made", words=True)]
-    rows = [
-        (
-            one.stage,
-            [str(len(one.fresh)), str(len(one.stale)), str(len(one.missing)), _named(one.stale + one.missing)],
-        )
-        for one in found
-    ]
+    rows = []
+    for one in found:
+        due = one.stale + one.missing
+        named = ", ".join(due[:_NAMED]) + (f" and {len(due) - _NAMED} more" if len(due) > _NAMED else "")
+        rows.append((one.stage, [*(str(len(part)) for part in (one.fresh, one.stale, one.missing)), named]))
     return TextTable("stage", columns, rows)
-
-
-def _named(scenes: Sequence[str], most: int = 3) -> str:
-    more = f" and {len(scenes) - most} more" if len(scenes) > most else ""
-    return ", ".join(scenes[:most]) + more

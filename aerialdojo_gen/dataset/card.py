@@ -45,12 +45,12 @@ def _hf_type(kind: pa.DataType, indent: int = 4) -> str:
 
 
 def _scene_rows(root: DataRoot, made: list[Made]) -> list[dict[str, Any]]:
-    rows = []
-    for m in made:
-        row = store.read_scene(root, "release/scenes", m.scene).to_pylist()[0]
-        row |= {"landmarks": m.landmarks, "objects": m.objects, "tasks": m.instances, "km": m.path_m / 1000}
-        rows.append(row | {"paper_km": m.paper_scene.path_m / 1000 if m.paper_scene else None})
-    return rows
+    return [
+        store.read_scene(root, "release/scenes", m.scene).to_pylist()[0]
+        | {"landmarks": m.landmarks, "objects": m.objects, "tasks": m.instances, "km": m.path_m / 1000}
+        | {"paper_km": m.paper_scene.path_m / 1000 if m.paper_scene else None}
+        for m in made
+    ]
 
 
 def _attributions(scenes: list[dict[str, Any]]) -> dict[str, list[str]]:

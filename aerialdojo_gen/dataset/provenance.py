@@ -125,12 +125,8 @@ def check_replaced(data: Where, pipeline: Pipeline, scenes: Sequence[str], *, wh
 
 def _listed(root: DataRoot, scenes: list[str]) -> str:
     names = ", ".join(scenes[:4]) + (", …" if len(scenes) > 4 else "")
-    tasks = sum(_tasks(root, scene) for scene in scenes)
+    tasks = 0
+    for scene in scenes:
+        with contextlib.suppress(StoreError):
+            tasks += sum(store.count_rows(root, table, scene) for table in ("tasks/train", "tasks/test"))
     return f"{len(scenes)} scene{'s' * (len(scenes) > 1)} with {tasks:,} tasks ({names})"
-
-
-def _tasks(root: DataRoot, scene: str) -> int:
-    try:
-        return sum(store.count_rows(root, table, scene) for table in ("tasks/train", "tasks/test"))
-    except StoreError:
-        return 0

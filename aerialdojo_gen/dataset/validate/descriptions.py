@@ -16,7 +16,6 @@ from typing import Any
 from aerialdojo_gen.annotations.claims import Claim, SceneClaims
 from aerialdojo_gen.annotations.format import Landmark
 from aerialdojo_gen.annotations.matching import Matcher
-from aerialdojo_gen.annotations.relations import SceneGeometry
 from aerialdojo_gen.annotations.vocabulary import Vocabulary
 from aerialdojo_gen.base.constants import DIRECTIONS
 from aerialdojo_gen.base.errors import AerialDojoError
@@ -181,7 +180,7 @@ def _read_claims(data: SceneData) -> SceneClaims:
     named = zip(marks.ints("landmark_id").tolist(), map(str, marks.texts("name")), nodes, strict=True)
     landmarks = [Landmark.model_construct(id=k, name=name, node=node) for k, name, node in named]
     landmarks.sort(key=lambda mark: mark.id)
-    return SceneClaims(Vocabulary(scene, catalogue), landmarks, SceneGeometry(scene))
+    return SceneClaims(Vocabulary(scene, catalogue), landmarks)
 
 
 def _recoloured(instance: Instance, text: str) -> str:

@@ -9,7 +9,6 @@ from aerialdojo_gen.annotations.claims import Claim, SceneClaims
 from aerialdojo_gen.annotations.format import Landmark
 from aerialdojo_gen.annotations.language.sides import WRITTEN
 from aerialdojo_gen.annotations.language.writer import Text, Writer
-from aerialdojo_gen.annotations.relations import SceneGeometry
 from aerialdojo_gen.annotations.vocabulary import Vocabulary
 from aerialdojo_gen.base.cli_context import command
 from aerialdojo_gen.base.config.sections import DescribeConfig
@@ -27,7 +26,7 @@ def run(job: Job, config: DescribeConfig) -> Output:
     shown = {row["object_id"]: set(row["parts_shown"]) for row in job.read("references").to_pylist()}
     vocabulary = Vocabulary.of(job.scene_model(), load_catalogue(job.roots.scene_assets))
     marks = [Landmark(id=m["landmark_id"], name=m["name"], node=m["mesh_node"]) for m in landmarks]
-    claims = SceneClaims(vocabulary, marks, SceneGeometry.of(vocabulary.scene))
+    claims = SceneClaims(vocabulary, marks)
     writer = Writer(claims, [mark.name for mark in marks], job.seed, job.stage)
     rows: list[dict[str, Any]] = []
     counts = {"written by a person": 0, "with fewer texts": 0}
