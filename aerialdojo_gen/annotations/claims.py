@@ -12,9 +12,10 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache, partial
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
+from pydantic import ConfigDict, StrictBool, StrictStr, TypeAdapter
 
 from aerialdojo_gen.annotations.appearance import SHADES, unsupported_colours
 from aerialdojo_gen.annotations.format import Landmark
@@ -33,10 +34,11 @@ from aerialdojo_gen.annotations.relations import (
 from aerialdojo_gen.annotations.vocabulary import Vocabulary
 from aerialdojo_gen.base.cached import cached_method
 from aerialdojo_gen.base.constants import DIRECTIONS
+from aerialdojo_gen.base.safe_parse import loads_json
 from aerialdojo_gen.geometry.frames import compass_direction
 from aerialdojo_gen.scenes.model import Instance
 
-KINDS = ("colour", "size", "attribute", "part", "place", "relation", "direction")
+Kind = Literal["colour", "size", "attribute", "part", "place", "relation", "direction"]
 # Attributes that are no adjectives: claims of a kind of their own, or words of the noun.
 _NO_VALUES = frozenset({"colour", "size", "place", "called", "group"})
 _ONE_COLOUR = [frozenset(words.split()) for words in TABLES["one_colour"].values()]
@@ -51,18 +53,20 @@ _MAX_THINGS, _MAX_BETWEEN, _MIN_SIZE_M = 14, 8, 0.3
 class Mention:
     """A thing that a claim names."""
 
-    node: str
-    noun: str  # Its category's name, or the landmark's
-    said: tuple[str, ...] = ()  # Adjectives that the text must say with it ("red")
-    unique: bool = False  # Whether the scene has one such thing: "the", else "a"
+    __pydantic_config__ = ConfigDict(extra="forbid")
+
+    node: StrictStr
+    noun: StrictStr  # Its category's name, or the landmark's
+    said: tuple[StrictStr, ...]  # Adjectives that the text must say with it ("red")
+    unique: StrictBool  # Whether the scene has one such thing: "the", else "a"
 
 
 @dataclass(frozen=True)
 class Claim:
     """One thing that is said of an object."""
 
-    kind: str  # One of `KINDS`
-    key: str  # "red", "state=open top", a look's phrase, "beside", "north of", a phrase of place, "northeast"
+    kind: Kind
+    key: StrictStr  # "red", "state=open top", a look's phrase, "beside", "north of", a phrase of place, "northeast"
     things: tuple[Mention, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
@@ -70,22 +74,13 @@ class Claim:
         things = [{"node": m.node, "noun": m.noun, "said": list(m.said), "unique": m.unique} for m in self.things]
         return {"kind": self.kind, "key": self.key, **({"things": things} if things else {})}
 
-    @classmethod
-    def from_json(cls, raw: Any) -> Claim:
-        """Read `to_json`; ValueError where it is malformed."""
-        things = raw.get("things", []) if isinstance(raw, dict) else None
-        if not isinstance(things, list) or raw.get("kind") not in KINDS or not isinstance(raw.get("key"), str):
-            raise ValueError("a claim has a kind, a key and things")
-        return cls(raw["kind"], raw["key"], tuple(map(_mention, things)))
+
+_CLAIMS = TypeAdapter(list[Claim])
 
 
-def _mention(raw: Any) -> Mention:
-    if not isinstance(raw, dict) or raw.keys() != {"node", "noun", "said", "unique"}:
-        raise ValueError("a thing of a claim has node, noun, said and unique")
-    node, noun, said, unique = raw["node"], raw["noun"], raw["said"], raw["unique"]
-    if not isinstance(said, list) or not all(isinstance(word, str) for word in (node, noun, *said)):
-        raise ValueError("a thing of a claim has words")
-    return Mention(node, noun, tuple(said), bool(unique))
+def claims_from_json(text: str) -> list[Claim]:
+    """Read a JSON list of `Claim.to_json`; ValueError or `BeyondBounds` where it is malformed."""
+    return _CLAIMS.validate_python(loads_json(text))
 
 
 class SceneClaims:

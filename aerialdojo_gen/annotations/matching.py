@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property, lru_cache
 
 from aerialdojo_gen.annotations.appearance import SHADES
-from aerialdojo_gen.annotations.claims import Claim, Mention, SceneClaims
+from aerialdojo_gen.annotations.claims import Claim, Kind, Mention, SceneClaims
 from aerialdojo_gen.annotations.phrases import LISTS, TABLES, phrases_of_value, plural, spoken
 from aerialdojo_gen.base.constants import DIRECTIONS
 from aerialdojo_gen.scenes.model import Instance
@@ -150,7 +150,14 @@ class Matcher:
         attributes = self._instances[i].attributes
         for value in values:
             known = sorted(self._values_of.get(value, ())) if value not in colours else []
-            claims = [Claim(k, v) if k in ("colour", "size") else Claim("attribute", f"{k}={v}") for k, v in known]
+            claims = [
+                Claim("colour", v)
+                if k == "colour"
+                else Claim("size", v)
+                if k == "size"
+                else Claim("attribute", f"{k}={v}")
+                for k, v in known
+            ]
             true = [claim for claim in claims if self._claims.holds(claim, i)]
             denied = [claim for claim, (key, _) in zip(claims, known, strict=True) if named and key in attributes]
             yield from ((claim, value) for claim in true or denied[:1])
@@ -205,10 +212,10 @@ class Reading:
 
     def _thing(self, name: str, words: list[str]) -> None:
         if self._relation:
-            mention = Mention(self._matcher.landmark_nodes.get(name, ""), name, tuple(self._values))
+            mention = Mention(self._matcher.landmark_nodes.get(name, ""), name, tuple(self._values), unique=False)
             self._things.append(mention)
             if self._relation != "between" or len(self._things) == 2:
-                kind = "direction" if mention.node and self._relation.endswith(" of") else "relation"
+                kind: Kind = "direction" if mention.node and self._relation.endswith(" of") else "relation"
                 key = self._relation.removesuffix(" of") if kind == "direction" else self._relation
                 self.claims[Claim(kind, key, tuple(self._things))] = " ".join([*self._words, *words])
                 self._things = []

@@ -20,7 +20,7 @@ from aerialdojo_gen.scenes.claims import valid_phrases
 from aerialdojo_gen.scenes.model import Material, Scene
 
 TOWER = Landmark(id=0, name="clock tower", node="clock_tower_000")
-YELLOW_MAILBOX = Mention("", "mailbox", ("yellow",))
+YELLOW_MAILBOX = Mention("", "mailbox", ("yellow",), False)
 
 
 class _Street:

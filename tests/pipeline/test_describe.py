@@ -1,11 +1,10 @@
 """The texts of the stage `describe` and of the release that they go into."""
 
-import json
 from collections import Counter
 
 import pytest
 
-from aerialdojo_gen.annotations.claims import Claim, SceneClaims
+from aerialdojo_gen.annotations.claims import SceneClaims, claims_from_json
 from aerialdojo_gen.annotations.format import Landmark
 from aerialdojo_gen.annotations.language.sides import WRITTEN, of_side
 from aerialdojo_gen.annotations.language.writer import LENGTHS, Writer
@@ -41,7 +40,7 @@ def test_texts_make_true_claims_that_fit_nothing_else(smoke, claims):
     for row in made:
         item = objects[row["object_id"]]
         i = claims.geometry.index[item["mesh_node"]]
-        own = [Claim.from_json(raw) for raw in json.loads(item["claims"])]
+        own = claims_from_json(item["claims"])
         said = [own[k] for k in row["claims"]]
         assert all(claims.holds(claim, i) for claim in said), row["text"]
         assert not claims.distractors(i, said), row["text"]
@@ -55,7 +54,7 @@ def test_parts_that_no_picture_shows_are_not_said(smoke, claims):
     parts = 0
     for item in rows_of(smoke, "objects"):
         i = claims.geometry.index[item["mesh_node"]]
-        own = [Claim.from_json(raw) for raw in json.loads(item["claims"])]
+        own = claims_from_json(item["claims"])
         # Of the others, such as "longer than a car", the whole is the part.
         named = {look.phrase for look in claims.vocabulary.appearances_of(claims.scene.instances[i]) if look.parts}
         for text in writer.texts(i, own, set(), 5):
@@ -68,7 +67,7 @@ def test_a_scene_is_described_alike_each_time(smoke, claims):
     def described():
         writer = Writer(claims, ["a"], 3, "describe")
         for item in rows_of(smoke, "objects"):
-            own = [Claim.from_json(raw) for raw in json.loads(item["claims"])]
+            own = claims_from_json(item["claims"])
             yield writer.texts(claims.geometry.index[item["mesh_node"]], own, None, 5)
 
     assert list(described()) == list(described())

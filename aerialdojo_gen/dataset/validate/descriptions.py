@@ -13,13 +13,12 @@ import re
 from collections.abc import Iterator
 from typing import Any
 
-from aerialdojo_gen.annotations.claims import Claim, SceneClaims
+from aerialdojo_gen.annotations.claims import Claim, SceneClaims, claims_from_json
 from aerialdojo_gen.annotations.format import Landmark
 from aerialdojo_gen.annotations.matching import Matcher
 from aerialdojo_gen.annotations.vocabulary import Vocabulary
 from aerialdojo_gen.base.constants import DIRECTIONS
 from aerialdojo_gen.base.errors import AerialDojoError
-from aerialdojo_gen.base.safe_parse import loads_json
 from aerialdojo_gen.dataset.validate.registry import Finding, check
 from aerialdojo_gen.dataset.validate.rows import Rows, SceneData, UncheckedError
 from aerialdojo_gen.scenes.catalogue import load_catalogue
@@ -110,8 +109,7 @@ def _texts(rows: Rows, row: int) -> list[tuple[str, str]]:
 def _claims(rows: Rows, row: int) -> list[Claim] | None:
     """Read an object's claims; None where they are malformed."""
     try:
-        raw = loads_json(str(rows.texts("claims")[row]))
-        return [Claim.from_json(one) for one in raw] if isinstance(raw, list) else None
+        return claims_from_json(str(rows.texts("claims")[row]))
     except (AerialDojoError, ValueError):
         return None
 

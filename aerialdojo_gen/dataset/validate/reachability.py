@@ -168,7 +168,8 @@ def _open_bodies(instance: Instance) -> list[trimesh.Trimesh]:
     rim = (count[same.reshape(-1)] == 1).reshape(-1, 3).any(axis=1)
     if not rim.any():
         return []
-    of_face = trimesh.graph.connected_component_labels(mesh.edges, len(mesh.vertices))[mesh.faces[:, 0]]
+    label = trimesh.graph.connected_component_labels(mesh.edges, len(mesh.vertices))  # type: ignore[no-untyped-call]
+    of_face = label[mesh.faces[:, 0]]
     return [trimesh.Trimesh(mesh.vertices, mesh.faces[of_face == k], process=False) for k in np.unique(of_face[rim])]
 
 

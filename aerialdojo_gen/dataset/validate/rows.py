@@ -248,8 +248,8 @@ class SceneData:
         lists = [pc.list_flatten(table.column(name)) for name in LISTS]
         *pose, action = (part.to_numpy(zero_copy_only=False) if len(part) else np.empty(0) for part in lists)
         first = np.concatenate([[0], np.cumsum(np.where(fit, lengths[:, 0], 0))]).astype(np.int64)
-        action = np.nan_to_num(action, nan=-1).astype(np.int64)
-        return Paths(fit, first, np.column_stack(pose).astype(np.float64), action)
+        actions = np.nan_to_num(action, nan=-1).astype(np.int64)
+        return Paths(fit, first, np.column_stack(pose).astype(np.float64), actions)
 
     def flagged(self, table: str, checks: Sequence[str]) -> Mask:
         """Rows of a table that one of these checks found fault with, (n,) bool."""

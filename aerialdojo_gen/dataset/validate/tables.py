@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 import pyarrow as pa
@@ -62,11 +62,10 @@ def null_value(_data: SceneData, rows: Rows) -> Iterator[Finding]:
         if field.nullable:
             continue
         column = rows.column(field.name)
-        for row in np.flatnonzero(pc.is_null(column).to_numpy(zero_copy_only=False)):
-            yield Finding(int(row), f"{field.name} is null", "a value")
-        if pa.types.is_list(column.type) and pc.list_flatten(column).null_count:
-            parents = pc.list_parent_indices(column).filter(pc.is_null(pc.list_flatten(column)))
-            for row in pc.unique(parents).to_pylist():
+        for row in pc.indices_nonzero(pc.is_null(column)).to_pylist():
+            yield Finding(row, f"{field.name} is null", "a value")
+        if pa.types.is_list(column.type):
+            for row in _rows_with(column, pc.is_null):
                 yield Finding(row, f"a null in {field.name}", "a value")
 
 
@@ -74,15 +73,18 @@ def null_value(_data: SceneData, rows: Rows) -> Iterator[Finding]:
 def not_finite(_data: SceneData, rows: Rows) -> Iterator[Finding]:
     """No NaN and no infinity."""
     for field in rows.spec.schema:
-        column = rows.column(field.name)
-        is_list = pa.types.is_list(field.type)
-        values = pc.list_flatten(column) if is_list else column
-        if not pa.types.is_floating(values.type):
-            continue
-        wrong = pc.invert(pc.fill_null(pc.is_finite(values), True))
-        where = pc.list_parent_indices(column).filter(wrong) if is_list else pc.indices_nonzero(wrong)
-        for row in pc.unique(where).to_pylist():
-            yield Finding(row, f"{field.name} is not finite", "a finite number")
+        if pa.types.is_floating(field.type.value_type if pa.types.is_list(field.type) else field.type):
+            wrong = _rows_with(rows.column(field.name), lambda v: pc.invert(pc.fill_null(pc.is_finite(v), True)))
+            for row in wrong:
+                yield Finding(row, f"{field.name} is not finite", "a finite number")
+
+
+def _rows_with(column: pa.Array, test: Callable[[pa.Array], pa.Array]) -> list[int]:
+    """Rows whose value, or one of whose list of values, passes a test."""
+    if not pa.types.is_list(column.type):
+        return list(pc.indices_nonzero(test(column)).to_pylist())
+    parents = pc.list_parent_indices(column)
+    return list(pc.unique(parents.filter(test(pc.list_flatten(column)))).to_pylist())
 
 
 @check("*")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any
 
-from aerialdojo_gen.annotations.claims import Claim, SceneClaims
+from aerialdojo_gen.annotations.claims import SceneClaims, claims_from_json
 from aerialdojo_gen.annotations.format import Landmark
 from aerialdojo_gen.annotations.language.sides import WRITTEN
 from aerialdojo_gen.annotations.language.writer import Text, Writer
@@ -13,7 +13,6 @@ from aerialdojo_gen.annotations.vocabulary import Vocabulary
 from aerialdojo_gen.base.cli_context import command
 from aerialdojo_gen.base.config.sections import DescribeConfig
 from aerialdojo_gen.base.errors import AnnotationError
-from aerialdojo_gen.base.safe_parse import loads_json
 from aerialdojo_gen.pipeline.stage import Job, Output
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.store.schemas import DESCRIPTIONS
@@ -31,7 +30,7 @@ def run(job: Job, config: DescribeConfig) -> Output:
     rows: list[dict[str, Any]] = []
     counts = {"written by a person": 0, "with fewer texts": 0}
     for item in objects:
-        own = [Claim.from_json(raw) for raw in loads_json(item["claims"])]
+        own = claims_from_json(item["claims"])
         texts = writer.texts(
             claims.geometry.index[item["mesh_node"]], own, shown[item["object_id"]], config.paraphrases
         )
