@@ -17,7 +17,6 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import ConfigDict, StrictBool, StrictStr, TypeAdapter
 
-from aerialdojo_gen.annotations.appearance import SHADES, unsupported_colours
 from aerialdojo_gen.annotations.format import Landmark
 from aerialdojo_gen.annotations.phrases import TABLES
 from aerialdojo_gen.annotations.places import Places, places_of
@@ -31,7 +30,7 @@ from aerialdojo_gen.annotations.relations import (
     lies_towards,
     nearest_landmark,
 )
-from aerialdojo_gen.annotations.vocabulary import Vocabulary
+from aerialdojo_gen.annotations.vocabulary import SHADES, Vocabulary, unsupported_colours
 from aerialdojo_gen.base.cached import cached_method
 from aerialdojo_gen.base.constants import DIRECTIONS
 from aerialdojo_gen.base.safe_parse import loads_json

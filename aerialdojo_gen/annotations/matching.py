@@ -11,9 +11,9 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property, lru_cache
 
-from aerialdojo_gen.annotations.appearance import SHADES
 from aerialdojo_gen.annotations.claims import Claim, Kind, Mention, SceneClaims
 from aerialdojo_gen.annotations.phrases import LISTS, TABLES, phrases_of_value, plural, spoken
+from aerialdojo_gen.annotations.vocabulary import SHADES
 from aerialdojo_gen.base.constants import DIRECTIONS
 from aerialdojo_gen.scenes.model import Instance
 
@@ -22,6 +22,7 @@ _TOKEN = re.compile(r"[a-z0-9']+|[,.;:!?()]")
 _CORNER = re.compile(r"\b(north|south)[- ](east|west)")
 _MARK = "look'"
 _STOPS = frozenset(".;:!?")
+_PLAIN: Mapping[str, Kind] = {"colour": "colour", "size": "size"}  # Attributes with claims of their own kind
 
 
 def _relations() -> dict[tuple[str, ...], str]:
@@ -150,14 +151,7 @@ class Matcher:
         attributes = self._instances[i].attributes
         for value in values:
             known = sorted(self._values_of.get(value, ())) if value not in colours else []
-            claims = [
-                Claim("colour", v)
-                if k == "colour"
-                else Claim("size", v)
-                if k == "size"
-                else Claim("attribute", f"{k}={v}")
-                for k, v in known
-            ]
+            claims = [Claim(_PLAIN[k], v) if k in _PLAIN else Claim("attribute", f"{k}={v}") for k, v in known]
             true = [claim for claim in claims if self._claims.holds(claim, i)]
             denied = [claim for claim, (key, _) in zip(claims, known, strict=True) if named and key in attributes]
             yield from ((claim, value) for claim in true or denied[:1])

@@ -23,8 +23,8 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from aerialdojo_gen.annotations.appearance import GROUND, ground_triangles
 from aerialdojo_gen.annotations.relations import AT_M, BESIDE_M, NEAR_M, TOUCHING_M, SceneGeometry
+from aerialdojo_gen.annotations.vocabulary import GROUND, ground_triangles
 from aerialdojo_gen.base.cached import cached_method
 from aerialdojo_gen.base.errors import AnnotationError
 from aerialdojo_gen.base.names import nearest

@@ -9,12 +9,11 @@ import numpy as np
 import pytest
 from support.annotation_scenes import PAINTS, box, street, street_annotations, street_vocabulary
 
-from aerialdojo_gen.annotations.appearance import Surface, colour_shares, repeats, unsupported_colours
 from aerialdojo_gen.annotations.check import check_source
 from aerialdojo_gen.annotations.claims import Claim, SceneClaims
 from aerialdojo_gen.annotations.format import format_annotations, parse_annotations
 from aerialdojo_gen.annotations.relations import DISTRACTOR_SLACK
-from aerialdojo_gen.annotations.vocabulary import Vocabulary
+from aerialdojo_gen.annotations.vocabulary import Surface, Vocabulary, colour_shares, repeats, unsupported_colours
 from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.scenes.claims import MIN_TRUE_PHRASES, valid_phrases
 from aerialdojo_gen.scenes.model import Material, Part, Scene

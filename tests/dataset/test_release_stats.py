@@ -15,8 +15,8 @@ from support.command_line import called
 from aerialdojo_gen.base.paper_figures import inventory, splits
 from aerialdojo_gen.dataset.contents import check_release
 from aerialdojo_gen.dataset.stats.comparison import as_csv, as_markdown
+from aerialdojo_gen.dataset.stats.figures import _round_length
 from aerialdojo_gen.dataset.stats.figures.charts import SETTING_COLOURS, _ranking, composition, save
-from aerialdojo_gen.dataset.stats.figures.maps import _round_length
 from aerialdojo_gen.dataset.stats.measures import difficulty_tables, goal_tables, read_goals, read_tasks
 from aerialdojo_gen.dataset.stats.tables import Made, benchmark_table, in_paper_order, made_of, tables
 from aerialdojo_gen.dataset.stats.variety import measure, read_variety, self_bleu, variety_table, words_of

@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 from support.layout_checks import ASSETS, catalogue, drawn
 
 import aerialdojo_gen.scenes.worlds
-from aerialdojo_gen.annotations.appearance import SHADES
 from aerialdojo_gen.annotations.phrases import phrases_of_value
+from aerialdojo_gen.annotations.vocabulary import SHADES
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.dataset.validate.meshes import _Air

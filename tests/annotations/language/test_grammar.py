@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aerialdojo_gen.annotations.appearance import SHADES
 from aerialdojo_gen.annotations.language.locations import Location, relation_phrases
 from aerialdojo_gen.annotations.language.nouns import Name, NounPhrase, Wording, name_of, noun_phrase, phrase_of
 from aerialdojo_gen.annotations.language.sentences import SLOTS, Content, compose, expand, frames
 from aerialdojo_gen.annotations.language.writer import LENGTHS
 from aerialdojo_gen.annotations.phrases import article, group_of, words_of
+from aerialdojo_gen.annotations.vocabulary import SHADES
 
 KINDS = {"terse": ("at", "ref"), "vague": ("at",), "normal": ("at", "ref", "at_with", "at_telling")}
 MORE = ("with", "telling", "at", "clause", "near")
