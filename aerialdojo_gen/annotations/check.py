@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -28,35 +27,19 @@ _WORDS = 60
 _SPACES = "has leading, trailing or double spaces"
 
 
-@dataclass(frozen=True)
-class Checked:
-    """What the checks found of an annotation file."""
+class SourceCheck:
+    """The checks of an annotation file against its scene, and what they found."""
 
-    faults: list[Fault]  # In line order
-    claims: SceneClaims | None  # None where the landmarks are at fault
-    unchecked: Mapping[int, list[str]]  # Words of texts that match no claim, by the object's index in the file
-
-
-def check_source(source: Source, vocabulary: Vocabulary, counts: tuple[int, int] | None = None) -> Checked:
-    """Check an annotation file against its scene."""
-    if source.document.value is None:
-        return Checked(list(source.faults), None, {})
-    checker = _Checker(source, vocabulary)
-    faults = sorted(dict.fromkeys([*source.faults, *checker.faults(counts)]), key=lambda fault: fault.line)
-    return Checked(faults, checker.claims, checker.unchecked)
-
-
-class _Checker:
-    """The checks of one file; each yields its faults."""
-
-    def __init__(self, source: Source, vocabulary: Vocabulary) -> None:
+    def __init__(self, source: Source, vocabulary: Vocabulary, counts: tuple[int, int] | None = None) -> None:
         self._source, self._scene, self._vocabulary = source, vocabulary.scene, vocabulary
         self._fault, self._raw = source.document.fault, source.document.value
         self._known = sorted({*vocabulary.names, *(instance.category for instance in self._scene.instances)})
-        self.claims: SceneClaims | None = None
-        self.unchecked: dict[int, list[str]] = {}
+        self.claims: SceneClaims | None = None  # None where the landmarks are at fault
+        self.unchecked: dict[int, list[str]] = {}  # Words of texts that match no claim, by the object's index
+        found = () if self._raw is None else self._find(counts)
+        self.faults = sorted(dict.fromkeys([*source.faults, *found]), key=lambda fault: fault.line)
 
-    def faults(self, counts: tuple[int, int] | None) -> Iterator[Fault]:
+    def _find(self, counts: tuple[int, int] | None) -> Iterator[Fault]:
         source, scene = self._source, self._scene
         if source.scene and source.scene != scene.name:
             yield self._fault(("scene",), f"is {source.scene!r}, the scene is {scene.name!r}")

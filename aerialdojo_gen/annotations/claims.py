@@ -132,7 +132,8 @@ class SceneClaims:
         instance = self.scene.instances[i]
         found = [*self._values(instance)]
         found += [Claim("part", say) for say in self.vocabulary.unrepeated_phrases(instance)]
-        found += self._place(i)
+        place = Claim("place", instance.attributes.get("place", ""))
+        found += [place] if place.key and self.holds(place, i) else []
         found += self._relations(i)
         bearing = self.bearings[i]
         if bearing is not None and bearing.clear:
@@ -151,7 +152,7 @@ class SceneClaims:
     def place_wordings(self) -> dict[str, tuple[str, ...]]:
         """Phrases of place, in lower case, and how else they are said; in a scene without a table its things' own."""
         if self.places is not None:
-            return {phrase: self.places.wordings(phrase) for phrase in self.places.phrases()}
+            return self.places.wordings
         found = (instance.attributes.get("place", "").lower() for instance in self.scene.instances)
         return {phrase: () for phrase in found if phrase}
 
@@ -164,11 +165,6 @@ class SceneClaims:
         for key, value in attributes.items():
             if value and key not in _NO_VALUES:
                 yield Claim("attribute", f"{key}={value}")
-
-    def _place(self, i: int) -> list[Claim]:
-        place = self.scene.instances[i].attributes.get("place", "")
-        bound = self.places is None or (place.lower() in self.places and not self.places.fault(i, place.lower()))
-        return [Claim("place", place)] if place and bound else []
 
     def _relations(self, i: int) -> list[Claim]:
         sizes = (self.geometry.boxes[:, 1] - self.geometry.boxes[:, 0]).max(axis=1)
@@ -292,7 +288,7 @@ class SceneClaims:
         place = claim.key.lower()
         if self.places is None:
             return self.scene.instances[j].attributes.get("place", "").lower() == place
-        return place in self.places and not self.places.fault(j, place, slack)
+        return place in self.places.wordings and not self.places.fault(j, place, slack)
 
     def _direction_holds(self, claim: Claim, j: int, slack: float) -> bool:
         marks = [self.geometry.index.get(m.node, -1) for m in claim.things]

@@ -111,19 +111,8 @@ class Places:
     def __init__(self, geometry: SceneGeometry, phrases: Mapping[str, Conditions]) -> None:
         self._geometry = geometry
         self._phrases = {phrase.lower(): conditions for phrase, conditions in phrases.items()}
-        self._said = {phrase.lower(): _wordings(phrase, entry) for phrase, entry in phrases.items()}
-
-    def __contains__(self, phrase: object) -> bool:
-        """Whether a phrase, in lower case, is bound."""
-        return phrase in self._phrases
-
-    def phrases(self) -> list[str]:
-        """List the bound phrases, in lower case."""
-        return sorted(self._phrases)
-
-    def wordings(self, phrase: str) -> tuple[str, ...]:
-        """List the wordings that texts may use for a bound phrase, in lower case: its own or `say`, then `also`."""
-        return self._said[phrase]
+        # By bound phrase, in lower case, what texts may say: it or `say`, then `also`.
+        self.wordings = {phrase.lower(): _wordings(phrase, entry) for phrase, entry in sorted(phrases.items())}
 
     @cached_method
     def fault(self, i: int, phrase: str, slack: float = 1.0) -> str:

@@ -15,7 +15,7 @@ from fuzzing.mutate import toml_dumped
 from fuzzing.plans import PLANS
 from support import annotation_scenes
 
-from aerialdojo_gen.annotations.check import check_source
+from aerialdojo_gen.annotations.check import SourceCheck
 from aerialdojo_gen.annotations.format import format_annotations, parse_annotations
 from aerialdojo_gen.base.config.pipeline import load_pipeline
 from aerialdojo_gen.base.errors import AerialDojoError
@@ -51,7 +51,7 @@ def _read_annotations(folder: Path) -> None:
         raise
     source = parse_annotations(format_annotations(annotations).encode().decode())
     assert source.annotations == annotations
-    checked = check_source(source, vocabulary)
+    checked = SourceCheck(source, vocabulary)
     utterable(map(str, checked.faults))
     if not checked.faults:
         annotation_tables(annotations, checked.claims)

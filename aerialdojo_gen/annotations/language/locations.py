@@ -106,8 +106,9 @@ class LocationPhrases:
     def of(self, i: int, index: int, claim: Claim, level: str, rng: np.random.Generator) -> Location:
         """Word a claim of instance `i`, for a text of a level."""
         if claim.kind == "place":
-            text = pick(self._place(claim.key), rng)
-            return Location(index, "place", claim.key, text)
+            places = self._claims.places
+            said = (claim.key,) if places is None else places.wordings.get(claim.key.lower(), (claim.key,))
+            return Location(index, "place", claim.key, pick(said, rng))
         things = [self._thing(i, mention, rng) for mention in claim.things]
         direction = claim.key.removesuffix(" of")
         key = "direction" if claim.kind == "direction" else "side" if direction in DIRECTIONS else claim.key
@@ -131,10 +132,6 @@ class LocationPhrases:
             if all(words[k].holds(self._claims, i, j) for j in nodes):
                 return words[k].say
         return ""
-
-    def _place(self, phrase: str) -> Sequence[str]:
-        places = self._claims.places
-        return places.wordings(phrase.lower()) if places is not None and phrase.lower() in places else (phrase,)
 
     def _thing(self, i: int, mention: Mention, rng: np.random.Generator) -> str:
         if mention.node in self._landmarks:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from aerialdojo_gen.annotations.check import check_source
+from aerialdojo_gen.annotations.check import SourceCheck
 from aerialdojo_gen.annotations.format import Annotations, Object, format_annotations, parse_annotations
 from aerialdojo_gen.annotations.relations import SceneGeometry, nearest_landmark
 from aerialdojo_gen.annotations.vocabulary import Vocabulary
@@ -30,7 +30,7 @@ class Describer:
         source = parse_annotations(format_annotations(annotations))
         faults: dict[tuple[str, int], list[dict[str, str]]] = {}
         general = []
-        faulty = check_source(source, self._vocabulary, self._counts).faults
+        faulty = SourceCheck(source, self._vocabulary, self._counts).faults
         for fault in faulty:
             message = _MENTION.sub(lambda m: called(m[1], getattr(annotations, m[1])[int(m[2])]), fault.message)
             at = _PATH.match(fault.path)
