@@ -80,8 +80,8 @@ def object_ambiguous(data: SceneData, rows: Rows) -> Iterator[Finding]:
         own = _claims(rows, row) or []
         made = [(one["text"], one["claims"]) for one in _made(rows, row) if one["claims"]]
         texts = [(text, [own[k] for k in chosen if k < len(own)]) for text, chosen in made]
-        told = {text for text, _ in made}
-        texts += [(t, matcher.true_claims(i, t)) for _, t in _texts(rows, row) if t not in told]
+        made_texts = {text for text, _ in made}
+        texts += [(t, matcher.true_claims(i, t)) for _, t in _texts(rows, row) if t not in made_texts]
         for text, claims in texts or [("all that is claimed", own)]:
             if others := known.listed(known.distractors(i, claims)):
                 yield Finding(row, f"{text!r}, which fits {others} as well", "words that fit one thing")

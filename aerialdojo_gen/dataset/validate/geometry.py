@@ -16,7 +16,6 @@ from aerialdojo_gen.dataset.validate.rows import (
     Mask,
     Rows,
     SceneData,
-    UncheckedError,
     at,
     place_text,
     pose_text,
@@ -99,11 +98,8 @@ def route_setting(data: SceneData, rows: Rows) -> Iterator[Finding]:
 @check("routes", after=("list_lengths_differ",))
 def out_of_bounds(data: SceneData, _rows: Rows) -> Iterator[Finding]:
     """The body never leaves the flight volume."""
-    paths, scenes = data.paths, data["scenes"]
-    if len(scenes) != 1:
-        raise UncheckedError("the scene's row is at fault")
-    radius = data.pipeline.embodiment.radius_m
-    low, high = (scenes.floats(*(f"{e}_{a}_m" for a in "xyz"))[0] for e in ("min", "max"))
+    paths, radius = data.paths, data.pipeline.embodiment.radius_m
+    low, high = (np.array([data.scene_row[f"{end}_{axis}_m"] for axis in "xyz"]) for end in ("min", "max"))
     outside = ((paths.xyz < low + radius - _LENGTH_M) | (paths.xyz > high - radius + _LENGTH_M)).any(axis=1)
     poses = np.flatnonzero(outside)
     corners = ["(" + ", ".join(f"{v:g}" for v in corner.tolist()) + ") m" for corner in (low, high)]

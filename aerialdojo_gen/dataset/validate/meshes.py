@@ -32,10 +32,9 @@ _ASIDE_M = 0.1  # so far aside of what it rests on may its middle be
 
 
 @check("scenes")
-def mesh_outside(data: SceneData, rows: Rows) -> Iterator[Finding]:
+def mesh_outside(data: SceneData, _rows: Rows) -> Iterator[Finding]:
     """A mesh's path stays in the data directory."""
-    data.require_meshes()
-    stored_path = str(rows.texts("mesh_path")[0])
+    stored_path = data.stored_mesh()
     away = Path(stored_path).is_absolute() or ".." in Path(stored_path).parts
     # A folder that the user names may be a link to anywhere, the release's own path may not.
     if data.meshes is None and isinstance(data.release.root, LocalRoot):
@@ -46,29 +45,28 @@ def mesh_outside(data: SceneData, rows: Rows) -> Iterator[Finding]:
 
 
 @check("scenes", after=("mesh_outside",))
-def mesh_missing(data: SceneData, rows: Rows) -> Iterator[Finding]:
+def mesh_missing(data: SceneData, _rows: Rows) -> Iterator[Finding]:
     """Every scene's mesh is there."""
-    data.require_meshes()
+    name = data.stored_mesh()
     if data.flagged("scenes", ("mesh_outside",)).any():
         return
     with contextlib.suppress(FileNotFoundError):
         if data.mesh_path().is_file():
             return
-    name = str(rows.texts("mesh_path")[0])
     place = data.release.root.at(name) if data.meshes is None else data.meshes / Path(name).name
     yield Finding(0, f"no file {place}", "the mesh (elsewhere: --meshes DIR; none: --no-meshes)")
 
 
 @check("scenes", after=("mesh_outside", "mesh_missing"))
-def mesh_digest(data: SceneData, rows: Rows) -> Iterator[Finding]:
+def mesh_digest(data: SceneData, _rows: Rows) -> Iterator[Finding]:
     """A mesh's bytes have the SHA-256 of its scene."""
-    data.require_meshes()
+    data.stored_mesh()
     if data.flagged("scenes", ("mesh_outside", "mesh_missing")).any():
         return
     with data.mesh_path().open("rb") as file:
         digest = hashlib.file_digest(file, "sha256").hexdigest()
-    if digest != rows.texts("mesh_sha256")[0]:
-        yield Finding(0, f"SHA-256 {digest}", str(rows.texts("mesh_sha256")[0]))
+    if digest != (stored := data.scene_row["mesh_sha256"]):
+        yield Finding(0, f"SHA-256 {digest}", stored)
 
 
 @check("scenes", after=("mesh_outside", "mesh_missing", "mesh_digest"))
@@ -81,9 +79,9 @@ def mesh_damaged(data: SceneData, _rows: Rows) -> Iterator[Finding]:
 
 
 @check("scenes", after=MESH_CHECKS)
-def scene_of_mesh(data: SceneData, rows: Rows) -> Iterator[Finding]:
+def scene_of_mesh(data: SceneData, _rows: Rows) -> Iterator[Finding]:
     """What the scene's row says is so in its mesh."""
-    stored = rows.table.to_pylist()[0]
+    stored = data.scene_row
     expected = scene_row(data.mesh, stored["mesh_path"], stored["mesh_sha256"])
     for name, value in expected.items():
         own = stored[name]

@@ -271,30 +271,34 @@ class SceneData:
         value: T = self.cache[name]
         return value
 
-    def require_meshes(self) -> None:
-        """Raise `UncheckedError` where meshes are to be left alone, or the scene's row is not one row."""
-        if not self.use_meshes:
-            raise UncheckedError("--no-meshes was given")
-        if "scenes" not in self.tables or len(self["scenes"]) != 1:
+    @property
+    def scene_row(self) -> dict[str, Any]:
+        """The row of `scenes`; `UncheckedError` where it is not one row, or at fault."""
+        if len(self["scenes"]) != 1:
             raise UncheckedError("scenes has not one row of it")
         if self.flagged("scenes", ALWAYS_AFTER).any():
             raise UncheckedError("the scene's row is at fault")
+        return dict(self["scenes"].table.to_pylist()[0])
+
+    def stored_mesh(self) -> str:
+        """Return where the scene's mesh is said to lie; `UncheckedError` where meshes are to be left alone."""
+        if not self.use_meshes:
+            raise UncheckedError("--no-meshes was given")
+        return str(self.scene_row["mesh_path"])
 
     def mesh_path(self) -> Path:
         """Return the scene's mesh on this machine; FileNotFoundError where it is not there."""
-        stored_path = str(self["scenes"].texts("mesh_path")[0])
         if self.meshes is None:
-            return self.release.root.local_copy(stored_path)
-        return LocalRoot(self.meshes).local_copy(Path(stored_path).name)
+            return self.release.root.local_copy(self.stored_mesh())
+        return LocalRoot(self.meshes).local_copy(Path(self.stored_mesh()).name)
 
     @property
     def mesh(self) -> Scene:
         """The scene's mesh, read once; `UncheckedError` where there is none to check by."""
-        self.require_meshes()
+        self.stored_mesh()
         if self.flagged("scenes", MESH_CHECKS).any():
             raise UncheckedError("no mesh")
-        digest = str(self["scenes"].texts("mesh_sha256")[0])
-        return self.cached("mesh", lambda: open_scene(self.mesh_path(), digest).scene)
+        return self.cached("mesh", lambda: open_scene(self.mesh_path(), self.scene_row["mesh_sha256"]).scene)
 
     @property
     def world(self) -> CollisionWorld:
