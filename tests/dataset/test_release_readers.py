@@ -23,7 +23,6 @@ import pytest
 import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from support.command_line import called
 from support.handmade import filled
 
 from aerialdojo_gen.base.errors import StoreError
@@ -230,18 +229,14 @@ def test_a_broken_release_is_named_by_its_file_and_its_mend(broken, damage, mess
     assert SCENE in existing_scenes(broken)
 
 
-def test_stats_of_a_broken_release_names_every_fault_and_shows_no_table(broken):
+def test_every_fault_of_a_release_is_named_and_a_scene_that_is_not_in_it(smoke, broken):
     part(broken, "routes/test").unlink()
     truncate(broken)
-    done = called("stats", "--data", broken)
-    assert done.returncode == 1
-    assert done.stdout == ""
-    damaged, missing = done.stderr.splitlines()
-    assert damaged.startswith(f"error: {part(broken, 'tasks/train')} is damaged")
+    with pytest.raises(StoreError) as error:
+        check_release(broken)
+    damaged, missing = str(error.value).splitlines()
+    assert damaged.startswith(f"{part(broken, 'tasks/train')} is damaged")
     assert missing.startswith(f"{part(broken, 'routes/test')} is missing")
-
-
-def test_a_scene_that_is_not_released_is_named(smoke):
     with pytest.raises(StoreError, match=r"U_Mall_0 is not in the release in .*: run aerialdojo-gen split --scene"):
         check_release(smoke, ["U_Mall_0"])
 

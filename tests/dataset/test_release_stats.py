@@ -294,14 +294,6 @@ def test_scale_bars_are_round(most, length):
     assert _round_length(most) == pytest.approx(length)
 
 
-def test_a_part_of_the_scenes_is_chosen_by_name_or_glob(smoke):
-    done = called("stats", "--data", smoke, "--scene", "*_1")
-    assert (done.returncode, "U_Courtyard_1" in done.stdout, "U_Courtyard_0" in done.stdout) == (0, True, False)
-    done = called("stats", "--data", smoke, "--scene", "U_Courtyard_2")
-    meant = "error: no scene 'U_Courtyard_2': did you mean 'U_Courtyard_1' or 'U_Courtyard_0'?\n"
-    assert (done.returncode, done.stderr) == (2, meant)
-
-
 TEXTS = ("A red van stands by the hut.", "A red van stands by the gate.", "Look for the blue tent. It has a door.")
 
 

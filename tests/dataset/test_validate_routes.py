@@ -307,16 +307,6 @@ def test_pieces_are_the_shortest_that_are_worth_it(planted):
     assert _pieces(straight) == []
 
 
-def test_a_sample_asks_fcl_about_so_many_routes_and_always_the_same(planted):
-    def sampled(most):
-        data = scene_data(planted, sample=most)
-        return data.sampled(data["routes"]).tolist()
-
-    assert len(sampled(5)) == 5
-    assert sampled(5) == sampled(5)
-    assert len(sampled(None)) == len(planted.rows(KEY)) + len(planted.rows("routes/test"))
-
-
 def test_checks_stand_after_those_that_they_build_on():
     seen = {table: set() for table in TABLES}
     for one in SCENE_CHECKS:

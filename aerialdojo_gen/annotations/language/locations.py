@@ -21,7 +21,6 @@ from aerialdojo_gen.base.rng import pick
 from aerialdojo_gen.base.safe_parse import read_toml
 
 WHERE = frozenset({"place", "relation", "direction"})
-_SHORT = 5
 _LEVEL_M = 1.0
 STRUCTURE = "structure"  # the kind of what is not in the catalogue
 
@@ -89,11 +88,6 @@ class Location:
     turned: str = ""  # "next to it", of the thing by the object; empty where that is not said
     unique: bool = False  # Whether the scene has one such thing
     lead: int = 0  # Words before the thing
-
-    @property
-    def short(self) -> bool:
-        """Whether another phrase may follow without a comma."""
-        return len(self.text.split()) <= _SHORT
 
 
 class LocationPhrases:

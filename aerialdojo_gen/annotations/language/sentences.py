@@ -9,6 +9,7 @@ from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from aerialdojo_gen.base.errors import AnnotationError
 from aerialdojo_gen.base.rng import pick
 from aerialdojo_gen.base.safe_parse import read_toml
 
+_T = TypeVar("_T")
 LEVELS = ("terse", "normal", "detailed", "vague")
 SLOTS = frozenset({"a", "the", "np", "be", "ing", "stands", "at", "ref", "byit", "nearit", "w", "clause"})
 # One in so many templates of first sentences of a kind is held out: those with the lowest hashes.
@@ -37,7 +39,7 @@ _OPENING = 2  # words that no other text of the object begins with
 _KINDS = {"at": 1.0, "ref": 0.5, "at_with": 1.0, "at_telling": 1.5}
 # "In front of the ..." begins a text more rarely than "by the ...": many would begin alike.
 _SHORT_LEAD, _RARELY = 2, 0.8
-_LONG = 8  # words of a place: what is longer ends its clause
+_SHORT, _LONG = 5, 8  # words of a place: what is short needs no comma, what is longer ends its clause
 _VERBS = frozenset({"be", "ing", "stands"})  # slots of a verb, which is not said twice
 _TURNED = 0.6  # how often a further place is said of the thing that it names
 _CLAUSE, _UNIQUE = 0.5, 0.6
@@ -147,13 +149,13 @@ def compose(
         kinds["ref"] = _KINDS["ref"]
     if details and section == "normal":
         kinds |= {kind: _KINDS[kind] for kind in ("at_telling" if details[0][1] else "at_with",)}
-    names, weights = list(kinds), np.array(list(kinds.values()))
-    kind = names[int(rng.choice(len(names), p=weights / weights.sum()))]
+    kind = _drawn(list(kinds), list(kinds.values()), rng)
     # Nothing is "with ..." twice, and no tail stands: "a planter with flowers standing by ...".
     tailed = bool(content.phrase.tail) or " with " in content.phrase.bare
-    first = _choose(_fitting(section, kind, held_out, bool(content.verb[1]), tailed), rng)
-    if first is None:
+    pool = _fitting(section, kind, held_out, bool(content.verb[1]), tailed)
+    if not pool:
         return None
+    first = _drawn(pool, [frame.share for frame in pool], rng)
     verb, participle = content.verb
     slots = {
         "a": content.phrase.a, "the": content.phrase.the, "np": content.phrase.bare,
@@ -197,11 +199,9 @@ def _fitting(section: str, kind: str, held_out: bool, participle: bool, tailed: 
     )  # fmt: skip
 
 
-def _choose(pool: Sequence[Frame], rng: np.random.Generator) -> Frame | None:
-    if not pool:
-        return None
-    weights = np.array([frame.share for frame in pool])
-    return pool[int(rng.choice(len(pool), p=weights / weights.sum()))]
+def _drawn(options: Sequence[_T], weights: Sequence[float], rng: np.random.Generator) -> _T:
+    shares = np.array(weights)
+    return options[int(rng.choice(len(options), p=shares / shares.sum()))]
 
 
 def _joined(places: Sequence[Location], template: str, rng: np.random.Generator) -> str:
@@ -211,7 +211,8 @@ def _joined(places: Sequence[Location], template: str, rng: np.random.Generator)
     after = template.partition("{at}")[2]
     # No comma before words that go on, and none after a short phrase.
     if first.kind == "place":
-        comma = "" if after[:1] == " " or (first.short and rng.random() < 0.6) else ","
+        short = len(first.text.split()) <= _SHORT
+        comma = "" if after[:1] == " " or (short and rng.random() < 0.6) else ","
         return f"{first.text}{comma} {second.text}"
     # "By the kiosk and the fountain" rather than "by the kiosk and next to the fountain".
     return f"{first.text} and {second.thing if first.key == second.key != 'between' else second.text}"
@@ -240,6 +241,5 @@ def _frame(
     pool = [frame for frame in frames("more", kind) if with_verb or "be" not in frame.slots]
     heard = {word for frame, _ in said for word in _LOOKING.findall(frame.text)}
     # "You'll see a keypad. You'll see it by the gate."
-    frame = _choose([f for f in pool if not heard & set(_LOOKING.findall(f.text))] or pool, rng)
-    assert frame is not None
-    return frame
+    pool = [frame for frame in pool if not heard & set(_LOOKING.findall(frame.text))] or pool
+    return _drawn(pool, [frame.share for frame in pool], rng)

@@ -148,8 +148,7 @@ def share_table(made: Sequence[Made]) -> Comparison:
         ours[partition] = share([n])
         ours[f"{partition} train"] = share((2 * m.of(s, "train") for m in group for s in SETTINGS), n)
     names = {"Mall": "malls", "ID train": "ID: of these, train", "OOD train": "OOD: of these, train"} | SETTING_NAMES
-    order = [*SETTINGS, *FAMILIES.values(), "Mall", "ID", "ID train", "OOD", "OOD train"]
-    rows = [Row(names.get(key, key), (ours[key],), (shares()[key] if whole else None,)) for key in order]
+    rows = [Row(names.get(key, key), (own,), (shares()[key] if whole else None,)) for key, own in ours.items()]
     title = "Shares of the task instances (the paper's appendix C)" if whole else "Shares of the task instances"
     return Comparison(title, "share of", (Column("%", "%", exact=False, digits=2),), tuple(rows))
 

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.dataset.validate.registry import Finding, Function, check
-from aerialdojo_gen.dataset.validate.rows import MESH_CHECKS, Floats, Rows, SceneData, UncheckedError
+from aerialdojo_gen.dataset.validate.rows import MESH_CHECKS, Floats, Rows, SceneData, UncheckedError, place_text
 
 _SAME = 1e-6
 # glTF's y is up, the world's z is: what a node's own coordinates become, and nothing else.
@@ -115,9 +115,9 @@ def mesh_extent(data: SceneData, _rows: Rows) -> Iterator[Finding]:
             low, high = part.vertices.min(axis=0), part.vertices.max(axis=0)
             off = (np.abs(own - accessor.get(name, np.nan)).max() for own, name in ((low, "min"), (high, "max")))
             if not max(off) <= _SAME * max(1.0, float(np.abs([low, high]).max())):
-                found = f"node {node['name']} from {_triple(low)} to {_triple(high)}"
-                stated = f"{_triple(accessor.get('min', ()))} to {_triple(accessor.get('max', ()))} m as told"
-                yield Finding(0, found, stated)
+                found = f"node {node['name']} from {place_text(low, 4)} to {place_text(high, 4)}"
+                stated = (place_text(np.asarray(accessor.get(name, ())), 4) for name in ("min", "max"))
+                yield Finding(0, found, f"{' to '.join(stated)}, as the file has it")
                 return
 
 
@@ -169,7 +169,7 @@ def _describe(world: Floats) -> str:
     """Describe how a transform differs from the expected one, in the world frame."""
     rest = np.linalg.inv(_UP) @ world
     if np.abs(rest[:3, :3] - np.eye(3)).max() <= _SAME:
-        return f"{_triple(rest[:3, 3])} m"
+        return place_text(rest[:3, 3], 4)
     return f"a turn or a scale, {np.round(rest[:3, :3], 4).tolist()}"
 
 
@@ -181,7 +181,3 @@ def _linear(srgb: Floats) -> Floats:
 
 def _rgb(colour: NDArray[Any] | tuple[int, int, int]) -> str:
     return "#" + "".join(f"{round(float(c)):02x}" for c in colour)
-
-
-def _triple(v: Any) -> str:
-    return "(" + ", ".join(f"{x:.4f}" for x in v) + ")"
