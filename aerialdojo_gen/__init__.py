@@ -16,9 +16,8 @@ if TYPE_CHECKING:
     from aerialdojo_gen.base.config.keys import config_keys
     from aerialdojo_gen.base.errors import AerialDojoError
     from aerialdojo_gen.benchmark.env import make_env
-    from aerialdojo_gen.dataset.build import run_pipeline
+    from aerialdojo_gen.dataset.build import pipeline_status, run_pipeline
     from aerialdojo_gen.dataset.release import Release, open_release
-    from aerialdojo_gen.dataset.status import pipeline_status
     from aerialdojo_gen.exchange.hub import pull_release, push_to_hub
     from aerialdojo_gen.pipeline.template import init_config
     from aerialdojo_gen.planning.planner import Planner, plan
@@ -53,7 +52,7 @@ _HOMES = {
     "init_config": "aerialdojo_gen.pipeline.template",
     "make_env": "aerialdojo_gen.benchmark.env",
     "open_release": "aerialdojo_gen.dataset.release",
-    "pipeline_status": "aerialdojo_gen.dataset.status",
+    "pipeline_status": "aerialdojo_gen.dataset.build",
     "plan": "aerialdojo_gen.planning.planner",
     "pull_release": "aerialdojo_gen.exchange.hub",
     "push_to_hub": "aerialdojo_gen.exchange.hub",

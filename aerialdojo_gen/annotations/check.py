@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from aerialdojo_gen.annotations.bearings import Bearing
 from aerialdojo_gen.annotations.claims import SceneClaims
-from aerialdojo_gen.annotations.format import Landmark, Object, Source
-from aerialdojo_gen.annotations.landmarks import reaches_into
+from aerialdojo_gen.annotations.format import Fault, Landmark, Object, Source
 from aerialdojo_gen.annotations.matching import Matcher
-from aerialdojo_gen.annotations.positions import Fault
-from aerialdojo_gen.annotations.relations import SceneGeometry
+from aerialdojo_gen.annotations.relations import Bearing
 from aerialdojo_gen.annotations.vocabulary import Vocabulary
 from aerialdojo_gen.base.names import nearest
 from aerialdojo_gen.base.safe_parse import JsonPath
-from aerialdojo_gen.scenes.model import Scene
+from aerialdojo_gen.scenes.model import Instance, Scene
 
 # Not allowed in names and descriptions: node names, decimals, number pairs, measured lengths.
 _UNSPOKEN = re.compile(
@@ -30,41 +27,19 @@ _WORDS = 60
 _SPACES = "has leading, trailing or double spaces"
 
 
-@dataclass(frozen=True)
-class Checked:
-    """What the checks found of an annotation file."""
+class SourceCheck:
+    """The checks of an annotation file against its scene, and what they found."""
 
-    faults: list[Fault]  # In line order
-    claims: SceneClaims | None  # None where the landmarks are at fault
-    unchecked: Mapping[int, list[str]]  # Words of texts that match no claim, by the object's index in the file
-
-
-def check_source(
-    source: Source,
-    vocabulary: Vocabulary,
-    counts: tuple[int, int] | None = None,
-    geometry: SceneGeometry | None = None,
-) -> Checked:
-    """Check an annotation file against its scene."""
-    if source.document.value is None:
-        return Checked(list(source.faults), None, {})
-    checker = _Checker(source, vocabulary, geometry or SceneGeometry(vocabulary.scene))
-    faults = sorted(dict.fromkeys([*source.faults, *checker.faults(counts)]), key=lambda fault: fault.line)
-    return Checked(faults, checker.claims, checker.unchecked)
-
-
-class _Checker:
-    """The checks of one file; each yields its faults."""
-
-    def __init__(self, source: Source, vocabulary: Vocabulary, geometry: SceneGeometry) -> None:
-        self._source, self._scene, self._geometry = source, vocabulary.scene, geometry
-        self._vocabulary = vocabulary
+    def __init__(self, source: Source, vocabulary: Vocabulary, counts: tuple[int, int] | None = None) -> None:
+        self._source, self._scene, self._vocabulary = source, vocabulary.scene, vocabulary
         self._fault, self._raw = source.document.fault, source.document.value
         self._known = sorted({*vocabulary.names, *(instance.category for instance in self._scene.instances)})
-        self.claims: SceneClaims | None = None
-        self.unchecked: dict[int, list[str]] = {}
+        self.claims: SceneClaims | None = None  # None where the landmarks are at fault
+        self.unchecked: dict[int, list[str]] = {}  # Words of texts that match no claim, by the object's index
+        found = () if self._raw is None else self._find(counts)
+        self.faults = sorted(dict.fromkeys([*source.faults, *found]), key=lambda fault: fault.line)
 
-    def faults(self, counts: tuple[int, int] | None) -> Iterator[Fault]:
+    def _find(self, counts: tuple[int, int] | None) -> Iterator[Fault]:
         source, scene = self._source, self._scene
         if source.scene and source.scene != scene.name:
             yield self._fault(("scene",), f"is {source.scene!r}, the scene is {scene.name!r}")
@@ -115,7 +90,7 @@ class _Checker:
         elif isinstance(entry, Landmark):
             if not reaches_into(scene, scene[node]):
                 yield self._fault((*path, "node"), f"{node!r} stands outside the scene's bounds")
-        elif not _inside(scene, scene[node].centroid):
+        elif not is_inside(scene, scene[node].centroid):
             yield self._fault((*path, "node"), f"the middle of {node!r} is outside the scene's bounds")
 
     def _object(self, path: JsonPath, entry: Object) -> Iterator[Fault]:
@@ -127,12 +102,12 @@ class _Checker:
         elif not scene.imported and entry.node in scene and scene[entry.node].category != category:
             text = f"is {category!r}, the node {entry.node!r} is a {scene[entry.node].category!r}"
             yield self._fault((*path, "category"), text)
-        if entry.anchor is not None and not _inside(scene, entry.anchor.position_m):
+        if entry.anchor is not None and not is_inside(scene, entry.anchor.position_m):
             yield self._fault((*path, "anchor", "position_m"), "outside the scene's bounds")
 
     def _texts(self) -> Iterator[Fault]:
         """Check directions, texts and that objects can be distinguished; only if all landmarks are valid."""
-        source, scene, geometry = self._source, self._scene, self._geometry
+        source, scene = self._source, self._scene
         landmarks = sorted(source.landmarks.values(), key=lambda entry: entry.id)
         nodes = [landmark.node for landmark in landmarks]
         raw = self._raw.get("landmarks") if isinstance(self._raw, dict) else None
@@ -144,13 +119,13 @@ class _Checker:
             if source.objects:
                 yield self._fault(("landmarks",), "there is none: objects need one to be located by")
             return
-        self.claims = SceneClaims(self._vocabulary, landmarks, geometry)
+        self.claims = SceneClaims(self._vocabulary, landmarks)
         matcher = Matcher(self.claims)
         described: dict[tuple[object, ...], int] = {}
         for k, entry in source.objects.items():
             if entry.node not in scene or entry.node in nodes:
                 continue
-            i = geometry.index[entry.node]
+            i = self.claims.geometry.index[entry.node]
             bearing = self.claims.bearings[i]
             if bearing is None:
                 text = "is exactly at its nearest landmark's position, so it has no direction"
@@ -159,7 +134,7 @@ class _Checker:
             for false in matcher.faults(i, entry.name):
                 yield self._fault(("objects", k, "name"), false)
             if entry.description is None or not entry.description.strip():
-                if others := self._listed(self.claims.distractors(i, self.claims.of(i))):
+                if others := self.claims.listed(self.claims.distractors(i, self.claims.of(i))):
                     text = f"nothing tells it from {others}, {bearing.direction} of the same landmark"
                     yield self._fault(("objects", k, "node"), f"{text}: choose another object")
                 continue
@@ -174,26 +149,19 @@ class _Checker:
         """Check a person's text: what is matched to claims must be so, and fit one thing."""
         assert self.claims is not None
         assert entry.description is not None
-        path, i = ("objects", k, "description"), self._geometry.index[entry.node]
+        path, i = ("objects", k, "description"), self.claims.geometry.index[entry.node]
         for false in matcher.faults(i, entry.description):
             yield self._fault(path, false)
         if words := matcher.read(entry.description, i).unchecked:
             self.unchecked[k] = words
-        for text, what in ((entry.description, "it"), (first_sentence(entry.name, entry.description), "its start")):
-            if others := self._listed(self.claims.distractors(i, matcher.true_claims(i, text))):
+        # A reader may stop after the first sentence.
+        start = f"The {entry.name}: {re.split(r'(?<=[.!?])[ ]', entry.description.strip(), maxsplit=1)[0]}"
+        for text, what in ((entry.description, "it"), (start, "its start")):
+            if others := self.claims.listed(self.claims.distractors(i, matcher.true_claims(i, text))):
                 where = f"{what} fits {others} as well, {bearing.direction} of the same landmark"
                 hint = "" if what == "it" else " in the first sentence"
                 yield self._fault(path, f"ambiguous: {where}; say{hint} how it differs or what stands near it")
                 break
-
-    def _listed(self, instances: Sequence[int]) -> str:
-        nodes = ", ".join(self._scene.instances[j].node for j in instances[:3])
-        return nodes + ("..." if len(instances) > 3 else "")
-
-
-def first_sentence(name: str, description: str) -> str:
-    """The name and the first sentence of a description: a reader may stop there."""
-    return f"The {name}: {re.split(r'(?<=[.!?])[ ]', description.strip(), maxsplit=1)[0]}"
 
 
 def description_faults(text: str) -> Iterator[str]:
@@ -214,5 +182,14 @@ def description_faults(text: str) -> Iterator[str]:
         yield f"has more than {_WORDS} words"
 
 
-def _inside(scene: Scene, point: Sequence[float] | np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> bool:
+def is_inside(scene: Scene, point: ArrayLike) -> bool:
+    """Whether a point is within a scene's bounds."""
     return bool(np.all(np.asarray(point) >= scene.bounds[0]) and np.all(np.asarray(point) <= scene.bounds[1]))
+
+
+def reaches_into(scene: Scene, instance: Instance) -> bool:
+    """Whether a landmark's middle lies over the site and some of it below the ceiling, as a high mast's does."""
+    (x0, y0, z0), (x1, y1, z1) = scene.bounds.tolist()
+    x, y, _ = instance.centroid.tolist()
+    bottom, top = instance.bounds[:, 2].tolist()
+    return x0 <= x <= x1 and y0 <= y <= y1 and bottom <= z1 and top >= z0

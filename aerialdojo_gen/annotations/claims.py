@@ -12,23 +12,32 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache, partial
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
+from pydantic import ConfigDict, StrictBool, StrictStr, TypeAdapter
 
-from aerialdojo_gen.annotations.appearance import SHADES, unsupported_colours
-from aerialdojo_gen.annotations.bearings import BORDER_DEG, Bearing, lies_towards, nearest_landmark
 from aerialdojo_gen.annotations.format import Landmark
+from aerialdojo_gen.annotations.phrases import TABLES
 from aerialdojo_gen.annotations.places import Places, places_of
-from aerialdojo_gen.annotations.relations import AGAINST_M, AT_M, DISTRACTOR_SLACK, SceneGeometry
-from aerialdojo_gen.annotations.vocabulary import Vocabulary
-from aerialdojo_gen.annotations.words import TABLES
+from aerialdojo_gen.annotations.relations import (
+    AGAINST_M,
+    AT_M,
+    BORDER_DEG,
+    DISTRACTOR_SLACK,
+    Bearing,
+    SceneGeometry,
+    lies_towards,
+    nearest_landmark,
+)
+from aerialdojo_gen.annotations.vocabulary import SHADES, Vocabulary, unsupported_colours
 from aerialdojo_gen.base.cached import cached_method
 from aerialdojo_gen.base.constants import DIRECTIONS
+from aerialdojo_gen.base.safe_parse import loads_json
 from aerialdojo_gen.geometry.frames import compass_direction
 from aerialdojo_gen.scenes.model import Instance
 
-KINDS = ("colour", "size", "attribute", "part", "place", "relation", "direction")
+Kind = Literal["colour", "size", "attribute", "part", "place", "relation", "direction"]
 # Attributes that are no adjectives: claims of a kind of their own, or words of the noun.
 _NO_VALUES = frozenset({"colour", "size", "place", "called", "group"})
 _ONE_COLOUR = [frozenset(words.split()) for words in TABLES["one_colour"].values()]
@@ -43,18 +52,20 @@ _MAX_THINGS, _MAX_BETWEEN, _MIN_SIZE_M = 14, 8, 0.3
 class Mention:
     """A thing that a claim names."""
 
-    node: str
-    noun: str  # Its category's name, or the landmark's
-    said: tuple[str, ...] = ()  # Adjectives that the text must say with it ("red")
-    unique: bool = False  # Whether the scene has one such thing: "the", else "a"
+    __pydantic_config__ = ConfigDict(extra="forbid")
+
+    node: StrictStr
+    noun: StrictStr  # Its category's name, or the landmark's
+    said: tuple[StrictStr, ...]  # Adjectives that the text must say with it ("red")
+    unique: StrictBool  # Whether the scene has one such thing: "the", else "a"
 
 
 @dataclass(frozen=True)
 class Claim:
     """One thing that is said of an object."""
 
-    kind: str  # One of `KINDS`
-    key: str  # "red", "state=open top", a look's phrase, "beside", "north of", a phrase of place, "northeast"
+    kind: Kind
+    key: StrictStr  # "red", "state=open top", a look's phrase, "beside", "north of", a phrase of place, "northeast"
     things: tuple[Mention, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
@@ -62,32 +73,21 @@ class Claim:
         things = [{"node": m.node, "noun": m.noun, "said": list(m.said), "unique": m.unique} for m in self.things]
         return {"kind": self.kind, "key": self.key, **({"things": things} if things else {})}
 
-    @classmethod
-    def from_json(cls, raw: Any) -> Claim:
-        """Read `to_json`; ValueError where it is malformed."""
-        things = raw.get("things", []) if isinstance(raw, dict) else None
-        if not isinstance(things, list) or raw.get("kind") not in KINDS or not isinstance(raw.get("key"), str):
-            raise ValueError("a claim has a kind, a key and things")
-        return cls(raw["kind"], raw["key"], tuple(map(_mention, things)))
+
+_CLAIMS = TypeAdapter(list[Claim])
 
 
-def _mention(raw: Any) -> Mention:
-    if not isinstance(raw, dict) or raw.keys() != {"node", "noun", "said", "unique"}:
-        raise ValueError("a thing of a claim has node, noun, said and unique")
-    node, noun, said, unique = raw["node"], raw["noun"], raw["said"], raw["unique"]
-    if not isinstance(said, list) or not all(isinstance(word, str) for word in (node, noun, *said)):
-        raise ValueError("a thing of a claim has words")
-    return Mention(node, noun, tuple(said), bool(unique))
+def claims_from_json(text: str) -> list[Claim]:
+    """Read a JSON list of `Claim.to_json`; ValueError or `BeyondBounds` where it is malformed."""
+    return _CLAIMS.validate_python(loads_json(text))
 
 
 class SceneClaims:
     """The claims about the instances of one scene."""
 
-    def __init__(
-        self, vocabulary: Vocabulary, landmarks: Sequence[Landmark], geometry: SceneGeometry | None = None
-    ) -> None:
+    def __init__(self, vocabulary: Vocabulary, landmarks: Sequence[Landmark]) -> None:
         self.vocabulary, self.scene = vocabulary, vocabulary.scene
-        self.geometry = geometry or SceneGeometry(self.scene)
+        self.geometry = SceneGeometry.of(self.scene)
         bound = None if self.scene.imported else places_of(self.scene.name)
         self.places = None if bound is None else Places(self.geometry, bound)
         self.landmarks = tuple(self.geometry.index[mark.node] for mark in landmarks)
@@ -122,13 +122,18 @@ class SceneClaims:
         """Instances that claims of `i` fit as well: only other claims distinguish them from it."""
         return [j for j in self.candidates(i) if all(self.holds(claim, j, DISTRACTOR_SLACK) for claim in claims)]
 
+    def listed(self, instances: Sequence[int]) -> str:
+        """Name the first of some instances by their nodes."""
+        return ", ".join(self.scene.instances[j].node for j in instances[:3]) + ("..." if len(instances) > 3 else "")
+
     @cached_method
     def of(self, i: int) -> tuple[Claim, ...]:
         """All true claims of an instance, by kind, the most natural first."""
         instance = self.scene.instances[i]
         found = [*self._values(instance)]
         found += [Claim("part", say) for say in self.vocabulary.unrepeated_phrases(instance)]
-        found += self._place(i)
+        place = Claim("place", instance.attributes.get("place", ""))
+        found += [place] if place.key and self.holds(place, i) else []
         found += self._relations(i)
         bearing = self.bearings[i]
         if bearing is not None and bearing.clear:
@@ -147,25 +152,19 @@ class SceneClaims:
     def place_wordings(self) -> dict[str, tuple[str, ...]]:
         """Phrases of place, in lower case, and how else they are said; in a scene without a table its things' own."""
         if self.places is not None:
-            return {phrase: self.places.wordings(phrase) for phrase in self.places.phrases()}
+            return self.places.wordings
         found = (instance.attributes.get("place", "").lower() for instance in self.scene.instances)
         return {phrase: () for phrase in found if phrase}
 
     def _values(self, instance: Instance) -> Iterator[Claim]:
         attributes = instance.attributes
-        colour = attributes.get("colour", "")
-        if colour and (self.scene.imported or not unsupported_colours(colour, instance, self.scene.materials)):
+        if colour := self.vocabulary.colour_of(instance):
             yield Claim("colour", colour)
         if attributes.get("size"):
             yield Claim("size", attributes["size"])
         for key, value in attributes.items():
             if value and key not in _NO_VALUES:
                 yield Claim("attribute", f"{key}={value}")
-
-    def _place(self, i: int) -> list[Claim]:
-        place = self.scene.instances[i].attributes.get("place", "")
-        bound = self.places is None or (place.lower() in self.places and not self.places.fault(i, place.lower()))
-        return [Claim("place", place)] if place and bound else []
 
     def _relations(self, i: int) -> list[Claim]:
         sizes = (self.geometry.boxes[:, 1] - self.geometry.boxes[:, 0]).max(axis=1)
@@ -289,7 +288,7 @@ class SceneClaims:
         place = claim.key.lower()
         if self.places is None:
             return self.scene.instances[j].attributes.get("place", "").lower() == place
-        return place in self.places and not self.places.fault(j, place, slack)
+        return place in self.places.wordings and not self.places.fault(j, place, slack)
 
     def _direction_holds(self, claim: Claim, j: int, slack: float) -> bool:
         marks = [self.geometry.index.get(m.node, -1) for m in claim.things]

@@ -1,7 +1,8 @@
 """Draft annotation files for a person to review.
 
-Objects are chosen category by category in turn, as far as claims exclude their distractors; the stage
-`describe` writes their texts. Every draft passes the checks of `annotate-import`.
+Landmarks are far apart, prominent, and each has a unique name. Objects are chosen category by category in turn, as
+far as claims exclude their distractors; the stage `describe` writes their texts. Every draft passes the checks of
+`annotate-import`.
 """
 
 from __future__ import annotations
@@ -12,12 +13,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from aerialdojo_gen.annotations.check import is_inside, reaches_into
 from aerialdojo_gen.annotations.claims import SceneClaims
 from aerialdojo_gen.annotations.format import Landmark, Object
-from aerialdojo_gen.annotations.landmarks import spread_m
 from aerialdojo_gen.annotations.language.writer import Writer
 from aerialdojo_gen.annotations.matching import Matcher
-from aerialdojo_gen.annotations.vocabulary import Vocabulary
+from aerialdojo_gen.annotations.vocabulary import NON_OBJECTS, UNKNOWN, Vocabulary
+from aerialdojo_gen.base.errors import AnnotationError
 from aerialdojo_gen.base.rng import rank
 from aerialdojo_gen.scenes.model import Instance
 
@@ -28,6 +30,11 @@ SCENERY = "of ground, slabs or scraps"
 _SHOWN = 3
 _INDISTINGUISHABLE = "indistinguishable from others of their category"
 _NO_DIRECTION = "at a landmark's position, or outside the bounds"
+# Margins by which the tallest is called tallest, and the northernmost northernmost.
+_TALLER = 1.1
+_FARTHER_M = 1.0
+_LARGE_M = 3.0
+_SIDES = (("northernmost", 1, 1.0), ("southernmost", 1, -1.0), ("easternmost", 0, 1.0), ("westernmost", 0, -1.0))
 
 
 @dataclass(frozen=True)
@@ -47,6 +54,103 @@ class DraftOptions:
     max_per_category: int | None = None  # Maximum objects per other category; default 5
 
 
+def choose_landmarks(
+    vocabulary: Vocabulary, n: int, requested: Sequence[str] = (), at_most: bool = False
+) -> tuple[Landmark, ...]:
+    """Choose landmarks: the requested ones, then the tallest, then whichever is farthest from those chosen."""
+    scene = vocabulary.scene
+    missing = [node for node in requested if node not in scene]
+    if missing:
+        raise AnnotationError(f"{scene.name}: no node {missing[0]!r} to make a landmark of")
+    chosen = [scene[node] for node in dict.fromkeys(requested)][:n]
+    own: dict[str, str] = {}
+    names = _UniqueNames(vocabulary)
+    inside = [i for i in scene.instances if reaches_into(scene, i)]
+    if scene.imported:
+        nameless = [i.node for i in chosen if not names.of(i)]
+        if nameless:
+            raise AnnotationError(
+                f"{scene.name}: the landmark {nameless[0]!r} is indistinguishable from others of its "
+                "category: choose another node"
+            )
+        prominent = [i for i in _prominent(inside) if i not in chosen]
+        rest = [i for i in prominent[: 8 * n] if names.of(i)]
+        if len(chosen) + len(rest) < n:
+            # Few names: the extreme one in each direction has a unique name, however low it is.
+            rest = [i for i in prominent if names.of(i)][:n]
+    else:
+        rest = [i for i in inside if vocabulary.kinds.get(i.category) == "landmark" and i not in chosen]
+        if len(chosen) + len(rest) < n and at_most:
+            # Mapped towns often have no landmark of the catalogue: use the tallest buildings, that is what is large
+            # itself, not only high up on a roof.
+            large = [i for i in _prominent(inside) if np.ptp(i.bounds, axis=0).min() >= _LARGE_M][: 8 * n]
+            own = {i.node: names.of(i) for i in large if i not in (*chosen, *rest) and names.of(i)}
+            rest += [i for i in large if i.node in own]
+    while len(chosen) < n and rest:
+        best = max(rest, key=lambda i: (spread_m(i, chosen), float(i.bounds[1, 2])))
+        chosen.append(best)
+        rest.remove(best)
+        if at_most and not scene.imported:
+            # A landmark's name must be unique: keep only one of identical statues.
+            rest = [i for i in rest if names.nouns[i.node].short != names.nouns[best.node].short]
+    if len(chosen) < n and not (at_most and chosen):
+        raise AnnotationError(
+            f"{scene.name}: {n} landmark{'s' if n > 1 else ''} requested, the scene has {len(chosen)}"
+        )
+    plain = [names.nouns[i.node].name for i in chosen]
+    landmark_names = [
+        names.of(i) if scene.imported else own.get(i.node) or (names.nouns[i.node].short if plain.count(p) > 1 else p)
+        for i, p in zip(chosen, plain, strict=True)
+    ]
+    if len(set(landmark_names)) < len(landmark_names):
+        raise AnnotationError(f"{scene.name}: landmarks share a name: {', '.join(sorted(landmark_names))}")
+    return tuple(
+        Landmark(id=k, name=name, node=i.node) for k, (name, i) in enumerate(zip(landmark_names, chosen, strict=True))
+    )
+
+
+def spread_m(instance: Instance, chosen: Sequence[Instance]) -> float:
+    """Distance in the plane to the nearest chosen instance, metres; 1000 if none is chosen."""
+    gaps = [float(np.hypot(*(instance.centroid[:2] - other.centroid[:2]))) for other in chosen]
+    return min(gaps, default=1000.0)
+
+
+def _prominent(instances: Sequence[Instance]) -> list[Instance]:
+    """Those of some instances that are things, highest first, those without a name last."""
+    things = [i for i in instances if i.category not in NON_OBJECTS]
+    return sorted(things, key=lambda i: (i.category == UNKNOWN, -float(i.bounds[1, 2]), i.node))
+
+
+class _UniqueNames:
+    """Unique names for the things of an imported mesh."""
+
+    def __init__(self, vocabulary: Vocabulary) -> None:
+        self.nouns = dict(zip((i.node for i in vocabulary.scene.instances), vocabulary.nouns, strict=True))
+        self._alike: dict[str, list[Instance]] = {}
+        for instance, noun in zip(vocabulary.scene.instances, vocabulary.nouns, strict=True):
+            self._alike.setdefault(noun.name, []).append(instance)
+
+    def of(self, instance: Instance) -> str:
+        """Return a unique name; empty if there is none."""
+        noun = self.nouns[instance.node]
+        others = [other for other in self._alike[noun.name] if other is not instance]
+        # An office building is also a building.
+        kinds = (name for name in self._alike if name.endswith(f" {noun.name}"))
+        others += [other for name in kinds for other in self._alike[name]]
+        if not others:
+            return noun.name
+        if not any(set(noun.adjectives) <= set(self.nouns[other.node].adjectives) for other in others):
+            return noun.short
+        rises = [float(np.ptp(other.bounds[:, 2])) for other in others]
+        if float(np.ptp(instance.bounds[:, 2])) > _TALLER * max(rises):
+            return f"tallest {noun.name}"
+        for word, axis, sign in _SIDES:
+            farthest = max(sign * float(other.centroid[axis]) for other in others)
+            if sign * float(instance.centroid[axis]) > farthest + _FARTHER_M:
+                return f"{word} {noun.name}"
+        return ""
+
+
 class AnnotationDrafter:
     """Chooses the objects of a scene."""
 
@@ -60,7 +164,8 @@ class AnnotationDrafter:
         self._matcher = Matcher(self._claims)
         self._writer = Writer(self._claims, [mark.name for mark in landmarks], options.seed, STAGE)
         candidates = [k for k, w in enumerate(vocabulary.words) if w.target and k not in self._claims.landmarks]
-        self.things = tuple(k for k in candidates if self._has_direction(k))
+        inside = (k for k in candidates if is_inside(self._scene, self._scene.instances[k].centroid))
+        self.things = tuple(k for k in inside if self._claims.bearings[k] is not None)
         scenery = sum(not w.target for w in vocabulary.words) if self._scene.imported else 0
         self.rejections.update({_NO_DIRECTION: len(candidates) - len(self.things), SCENERY: scenery})
 
@@ -71,19 +176,13 @@ class AnnotationDrafter:
 
     def rejection_summary(self) -> str:
         """Return why instances were rejected: ``"; not taken: 7 ..., 2 ..."``; empty if none were."""
-        text = ", ".join(f"{n:,} {why}{self._confusion_text(why)}" for why, n in self.rejections.most_common() if n)
-        return f"; not taken: {text}" if text else ""
-
-    def _confusion_text(self, why: str) -> str:
-        """Return what the first indistinguishable instances were confused with."""
-        if why != _INDISTINGUISHABLE:
-            return ""
-        pairs = [(node, others) for node, others in self.confusions if others][:_SHOWN]
-        text = "; ".join(
+        confused = "; ".join(
             f"{node} with {others[0]}{f' and {len(others) - 1:,} more' if len(others) > 1 else ''}"
-            for node, others in pairs
+            for node, others in [pair for pair in self.confusions if pair[1]][:_SHOWN]
         )
-        return f" ({text})" if text else ""
+        examples = {_INDISTINGUISHABLE: f" ({confused})"} if confused else {}
+        text = ", ".join(f"{n:,} {why}{examples.get(why, '')}" for why, n in self.rejections.most_common() if n)
+        return f"; not taken: {text}" if text else ""
 
     def objects(self, n: int, on_chosen: Callable[[], object] = lambda: None) -> tuple[Object, ...]:
         """Choose up to `n` objects, round-robin over categories; calls `on_chosen` for each."""
@@ -132,11 +231,6 @@ class AnnotationDrafter:
         for i in self.things:
             queues.setdefault(self._scene.instances[i].category, []).append(i)
         return {c: queues[c] for c in sorted(queues, key=lambda c: (rank(self._seed, STAGE, self._scene.name, c), c))}
-
-    def _has_direction(self, i: int) -> bool:
-        middle = self._scene.instances[i].centroid
-        inside = np.all(middle >= self._scene.bounds[0]) and np.all(middle <= self._scene.bounds[1])
-        return bool(inside) and self._claims.bearings[i] is not None
 
     def _in_core(self, i: int) -> bool:
         if self._options.core_radius_m is None:

@@ -9,13 +9,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 
-from aerialdojo_gen.annotations.appearance import SHADES
-from aerialdojo_gen.annotations.claims import Claim, Mention, SceneClaims
-from aerialdojo_gen.annotations.phrases import phrases_of_value, plural, spoken
-from aerialdojo_gen.annotations.words import LISTS, TABLES
+from aerialdojo_gen.annotations.claims import Claim, Kind, Mention, SceneClaims
+from aerialdojo_gen.annotations.phrases import LISTS, TABLES, phrases_of_value, plural, spoken
+from aerialdojo_gen.annotations.vocabulary import SHADES
 from aerialdojo_gen.base.constants import DIRECTIONS
 from aerialdojo_gen.scenes.model import Instance
 
@@ -24,6 +22,7 @@ _TOKEN = re.compile(r"[a-z0-9']+|[,.;:!?()]")
 _CORNER = re.compile(r"\b(north|south)[- ](east|west)")
 _MARK = "look'"
 _STOPS = frozenset(".;:!?")
+_PLAIN: Mapping[str, Kind] = {"colour": "colour", "size": "size"}  # Attributes with claims of their own kind
 
 
 def _relations() -> dict[tuple[str, ...], str]:
@@ -43,20 +42,12 @@ def _written(text: str) -> frozenset[str]:
     return frozenset(re.findall(r"[^\W_]+", text.casefold()))
 
 
-@dataclass
-class Matched:
-    """What is understood of a text about one object."""
-
-    claims: dict[Claim, str] = field(default_factory=dict)  # With the words that make it
-    called: str = ""  # What the text calls its object, if that contradicts the mesh
-    unchecked: list[str] = field(default_factory=list)  # Words that say something, and match nothing
-
-
 class Matcher:
     """Matches texts about the instances of one scene."""
 
     def __init__(self, claims: SceneClaims) -> None:
         self._claims, self._instances = claims, claims.scene.instances
+        self.landmark_nodes = claims.landmark_names
         self._categories: dict[str, set[str]] = {}
         for category, name in claims.vocabulary.names.items():
             for form in {name.lower(), spoken(category)}:
@@ -73,7 +64,7 @@ class Matcher:
         for place, wordings in claims.place_wordings().items():
             for wording in (place, *wordings):
                 self._add(wording, "place", place)
-        nouns = {noun.name.lower() for noun in claims.vocabulary.nouns} | {*claims.landmark_names}
+        nouns = {noun.name.lower() for noun in claims.vocabulary.nouns} | {*self.landmark_nodes}
         for name in sorted({*self._categories, *nouns}):
             for form in (plural(name), name):
                 self._add(form, "thing", name)
@@ -113,9 +104,9 @@ class Matcher:
         category = self._instances[i].category
         return self._claims.vocabulary.names.get(category, spoken(category))
 
-    def read(self, text: str, i: int) -> Matched:
+    def read(self, text: str, i: int) -> Reading:
         """Match a name or a description of an instance."""
-        reading = _Reading(self, i)
+        reading = Reading(self, i)
         text, appearances = self._replace_phrases(text, i)
         tokens, at = _tokens(text), 0
         while at < len(tokens):
@@ -127,7 +118,7 @@ class Matcher:
             reading.take(tokens[at : at + length], kind, meaning)
             at += length
         reading.end_clause()
-        return reading.matched
+        return reading
 
     def _replace_phrases(self, text: str, i: int) -> tuple[str, list[tuple[str, str]]]:
         """Replace the catalogue's phrases about the instance's category by marks; phrases and words by mark."""
@@ -160,7 +151,7 @@ class Matcher:
         attributes = self._instances[i].attributes
         for value in values:
             known = sorted(self._values_of.get(value, ())) if value not in colours else []
-            claims = [Claim(k, v) if k in ("colour", "size") else Claim("attribute", f"{k}={v}") for k, v in known]
+            claims = [Claim(_PLAIN[k], v) if k in _PLAIN else Claim("attribute", f"{k}={v}") for k, v in known]
             true = [claim for claim in claims if self._claims.holds(claim, i)]
             denied = [claim for claim, (key, _) in zip(claims, known, strict=True) if named and key in attributes]
             yield from ((claim, value) for claim in true or denied[:1])
@@ -173,16 +164,14 @@ class Matcher:
         own = {*_tokens(self._name(i)), *_tokens(spoken(instance.category))}
         return instance.category not in self._categories[called] and not own & set(_tokens(called))
 
-    def landmark(self, name: str) -> str:
-        """Node of a landmark by its name; empty if it is none."""
-        return self._claims.landmark_names.get(name, "")
 
-
-class _Reading:
-    """A text under way."""
+class Reading:
+    """What is understood of a text about one object."""
 
     def __init__(self, matcher: Matcher, i: int) -> None:
-        self.matched = Matched()
+        self.claims: dict[Claim, str] = {}  # With the words that make it
+        self.called = ""  # What the text calls its object, if that contradicts the mesh
+        self.unchecked: list[str] = []  # Words that say something, and match nothing
         self._matcher, self._i = matcher, i
         self._relation, self._words = "", list[str]()
         self._values, self._adjacent = list[str](), False
@@ -199,13 +188,13 @@ class _Reading:
             self._relation = meaning
         elif kind == "place":
             self.end_clause()
-            self.matched.claims[Claim("place", meaning)] = " ".join(words)
+            self.claims[Claim("place", meaning)] = " ".join(words)
         elif kind == "value":
             self._values.append(meaning)
         elif kind == "thing":
             self._thing(meaning, [*words])
         elif not kind and first.isalpha() and first not in LISTS["empty"] | LISTS["degrees"]:
-            self.matched.unchecked.append(first)
+            self.unchecked.append(first)
         if self._relation:
             self._words += words
         self._adjacent = kind == "value" or (self._adjacent and first in ("and", ","))
@@ -213,20 +202,20 @@ class _Reading:
     def add_phrase(self, phrase: str, words: str) -> None:
         """Take one of the catalogue's phrases: after a relation it is said of the other thing."""
         if not self._relation:
-            self.matched.claims[Claim("part", phrase)] = words
+            self.claims[Claim("part", phrase)] = words
 
     def _thing(self, name: str, words: list[str]) -> None:
         if self._relation:
-            mention = Mention(self._matcher.landmark(name), name, tuple(self._values))
+            mention = Mention(self._matcher.landmark_nodes.get(name, ""), name, tuple(self._values), unique=False)
             self._things.append(mention)
             if self._relation != "between" or len(self._things) == 2:
-                kind = "direction" if mention.node and self._relation.endswith(" of") else "relation"
+                kind: Kind = "direction" if mention.node and self._relation.endswith(" of") else "relation"
                 key = self._relation.removesuffix(" of") if kind == "direction" else self._relation
-                self.matched.claims[Claim(kind, key, tuple(self._things))] = " ".join([*self._words, *words])
+                self.claims[Claim(kind, key, tuple(self._things))] = " ".join([*self._words, *words])
                 self._things = []
         elif not self._subject:
             self._subject = name
-            self.matched.called = name if self._matcher.contradicts(self._i, name) else ""
+            self.called = name if self._matcher.contradicts(self._i, name) else ""
             self._resolve_pending(named=self._adjacent)
         self._values = []
 
@@ -239,4 +228,4 @@ class _Reading:
 
     def _resolve_pending(self, named: bool) -> None:
         for claim, words in self._matcher.values(self._i, self._values, named):
-            self.matched.claims.setdefault(claim, words)
+            self.claims.setdefault(claim, words)

@@ -1,4 +1,4 @@
-"""Noun phrases of instances: words by category (`phrases/*.toml`), adjectives, grammatical number."""
+"""Noun phrases of instances: words of English and by category (`*.toml`), adjectives, grammatical number."""
 
 from __future__ import annotations
 
@@ -8,11 +8,13 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from aerialdojo_gen.annotations.words import LISTS, TABLES
 from aerialdojo_gen.base.errors import AnnotationError
 from aerialdojo_gen.base.names import nearest
 from aerialdojo_gen.base.safe_parse import read_toml
 from aerialdojo_gen.scenes.model import Instance
+
+TABLES = read_toml(Path(__file__).with_name("words.toml"), AnnotationError)
+LISTS = {name: frozenset(words.split()) for name, words in TABLES["lists"].items()}
 
 _SINGULAR_ENDS = ("ss", "us", "is", "as")
 _GROUPS = {word: group for group, words in TABLES["groups"].items() for word in words.split()}
@@ -31,9 +33,8 @@ def group_of(name: str) -> str:
 
 # Attributes before the noun, in English order: a small rotten brown wooden bench.
 _ADJECTIVES = ("size", "state", "pattern", "shape", "colour", "material")
-_PLACE = "place"
-# Naming attributes of imported nodes (see `aerialdojo_gen.imports.naming`), not adjectives.
-_NAMING = frozenset({"called", "group"})
+# Phrases of place, and naming attributes of imported nodes (see `aerialdojo_gen.imports.naming`).
+_UNSAID = frozenset({"place", "called", "group"})
 _VERBS = {"vehicle": ("is parked", "parked"), "vegetation": ("grows", "growing")}
 
 
@@ -81,8 +82,7 @@ def _tables() -> tuple[dict[str, dict[str, Any]], dict[str, Any], frozenset[str]
                 if key not in _KEYS:
                     raise AnnotationError(f"{path}: [{name}]: unknown key {key!r}{nearest(key, _KEYS)}")
             tables[name] = entry
-    colours = frozenset(tables.pop("colours"))
-    values: dict[str, Any] = tables.pop("values")
+    colours, values = frozenset(tables.pop("colours")), tables.pop("values")
     return tables, values, colours
 
 
@@ -115,7 +115,7 @@ class Noun:
     @property
     def bare(self) -> str:
         """Without article: ``"orange hatchback with a black roof"``."""
-        return " ".join([*self.adjectives, self.name, *([self.after] if self.after else [])])
+        return " ".join(filter(None, (*self.adjectives, self.name, self.after)))
 
     @property
     def short(self) -> str:
@@ -126,20 +126,20 @@ class Noun:
 def noun_of(instance: Instance, words: CategoryWords) -> Noun:
     """Make the noun phrase from an instance's attributes."""
     name = instance.attributes.get("called") or words.name
+    said = {k: v for k, v in instance.attributes.items() if k not in _UNSAID}
     before: list[str] = []
-    after: list[str] = []
-    rest = [k for k in instance.attributes if k not in _ADJECTIVES and k != _PLACE and k not in _NAMING]
-    for key in (*_ADJECTIVES, *rest):
-        value = instance.attributes.get(key)
-        others = [v for k, v in instance.attributes.items() if k != key and k != _PLACE and k not in _NAMING]
-        if not value or value in name.split() or any(value in v.split() for v in others):
+    tail = ""
+    for key in dict.fromkeys((*_ADJECTIVES, *said)):
+        value = said.get(key)
+        if not value or value in name.split() or any(value in v.split() for k, v in said.items() if k != key):
             continue
         phrase = phrases_of_value(key, value, instance.category)[0]
         if phrase.startswith("+"):
             before.append(phrase[1:])
+        elif phrase.startswith("with ") and "with " in tail:
+            tail += " and " + phrase.removeprefix("with ")
         else:
-            after.append(phrase)
-    tail = _join(after)
+            tail += (" " if tail else "") + phrase
     if " with " in name and tail.startswith("with "):
         tail = "and" + tail.removeprefix("with")
     return Noun(tuple(before), name, tail)
@@ -152,7 +152,7 @@ def phrases_of_value(key: str, value: str, category: str) -> tuple[str, ...]:
         found = patterns.get(f"{key}={value}") or patterns.get(f"{key}=*")
         if found:
             patterns = [found] if isinstance(found, str) else found
-            filled = (one.replace("{a}", _with_article(value)).replace("{up}", value.upper()) for one in patterns)
+            filled = (one.replace("{a}", with_article(value)).replace("{up}", value.upper()) for one in patterns)
             return tuple(one.replace("{}", value) for one in filled)
     return (_phrase_by_rule(key, value),)
 
@@ -168,7 +168,7 @@ def _phrase_by_rule(key: str, value: str) -> str:
         return f"with its {value}"
     if key in ("state", "pattern") and (len(words) == 1 or words[0].endswith("ly")) and not _noun(words[-1]):
         return "+" + value
-    return f"with {value if _plural(words) else _with_article(value)}"
+    return f"with {value if _plural(words) else with_article(value)}"
 
 
 def _noun(word: str) -> bool:
@@ -180,16 +180,9 @@ def _plural(words: list[str]) -> bool:
     return _noun(head) or words[0] in ("a", "an", "the", "its", "one", "two", "three", "four")
 
 
-def _with_article(text: str) -> str:
+def with_article(text: str) -> str:
+    """Put a or an before a text."""
     return f"{article(text)} {text}"
-
-
-def _join(parts: list[str]) -> str:
-    text = ""
-    for part in parts:
-        repeated = part.startswith("with ") and "with " in text
-        text += " and " + part.removeprefix("with ") if repeated else (" " if text else "") + part
-    return text
 
 
 def article(text: str) -> str:

@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from fnmatch import fnmatchcase
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -23,8 +23,8 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from aerialdojo_gen.annotations.ground import GROUND, ground_triangles
 from aerialdojo_gen.annotations.relations import AT_M, BESIDE_M, NEAR_M, TOUCHING_M, SceneGeometry
+from aerialdojo_gen.annotations.vocabulary import GROUND, ground_triangles
 from aerialdojo_gen.base.cached import cached_method
 from aerialdojo_gen.base.errors import AnnotationError
 from aerialdojo_gen.base.names import nearest
@@ -32,10 +32,8 @@ from aerialdojo_gen.base.safe_parse import read_toml
 
 Conditions = Mapping[str, Any]
 
-# Conditions on things, by pattern.
-INSTANCE_RELATIONS = frozenset({"on", "roof", "under", "inside", "hull", "touching", "beside", "at", "near", "over"})
-# Beyond the centre of things, by compass direction.
-SIDES = frozenset({"north_of", "south_of", "east_of", "west_of"})
+# Keys of a phrase's table that are no conditions: wordings.
+_WORDS = frozenset({"say", "also"})
 _FOLDER = Path(__file__).parent / "places"
 _PARTS = frozenset(f"{a}{b}" for a in ("", "north", "south") for b in ("", "east", "west")) - {""} | {"middle"}
 # Farthest things that make a place: the heaps of a yard, the rows of a street.
@@ -98,21 +96,6 @@ def _texts(value: Any) -> bool:
     return isinstance(value, list) and all(map(_text, value)) and 0 < len(set(value)) == len(value)
 
 
-# Keys that are no conditions.
-_WORDS = frozenset({"say", "also"})
-_FORMS: Mapping[str, Callable[[Any], bool]] = {
-    **dict.fromkeys(INSTANCE_RELATIONS | SIDES | {"surface", "by", "say"}, _text),
-    "also": _texts,
-    "floor": lambda v: isinstance(v, list) and len(v) == 2 and isinstance(v[0], int) and _text(v[1]),
-    "between": lambda v: isinstance(v, list) and len(v) == 2 and all(map(_text, v)),
-    "z": lambda v: isinstance(v, list) and len(v) == 2 and all(map(_number, v)) and v[0] < v[1],
-    "high": _number,
-    "among": _among,
-    "part": lambda v: isinstance(v, str) and v in _PARTS,
-}
-
-
-_REACH_M: Mapping[str, float] = {"touching": TOUCHING_M, "beside": BESIDE_M, "at": AT_M, "near": NEAR_M}
 _STEP_M, _RISE_M = 0.4, 3.0
 _SLAB_SHARE = 0.06  # of the outline: smaller level surfaces are sills or stairs
 _STOREY_M = 1.6
@@ -128,25 +111,14 @@ class Places:
     def __init__(self, geometry: SceneGeometry, phrases: Mapping[str, Conditions]) -> None:
         self._geometry = geometry
         self._phrases = {phrase.lower(): conditions for phrase, conditions in phrases.items()}
-        self._said = {phrase.lower(): _wordings(phrase, entry) for phrase, entry in phrases.items()}
-
-    def __contains__(self, phrase: object) -> bool:
-        """Whether a phrase, in lower case, is bound."""
-        return phrase in self._phrases
-
-    def phrases(self) -> list[str]:
-        """List the bound phrases, in lower case."""
-        return sorted(self._phrases)
-
-    def wordings(self, phrase: str) -> tuple[str, ...]:
-        """List the wordings that texts may use for a bound phrase, in lower case: its own or `say`, then `also`."""
-        return self._said[phrase]
+        # By bound phrase, in lower case, what texts may say: it or `say`, then `also`.
+        self.wordings = {phrase.lower(): _wordings(phrase, entry) for phrase, entry in sorted(phrases.items())}
 
     @cached_method
     def fault(self, i: int, phrase: str, slack: float = 1.0) -> str:
         """Return the first condition of a phrase that does not hold for instance `i`; empty if all hold."""
         conditions = {k: v for k, v in self._phrases[phrase].items() if k not in _WORDS}.items()
-        wrong = (f"{name} = {value!r}" for name, value in conditions if not self._holds(i, name, value, slack))
+        wrong = (f"{name} = {value!r}" for name, value in conditions if not _TESTS[name](self, i, value, slack))
         return next(wrong, "")
 
     @cached_method
@@ -156,20 +128,15 @@ class Places:
             if any(fnmatchcase(thing.node, one) or thing.category == one for one in pattern.split("|"))
         )  # fmt: skip
 
-    def _holds(self, i: int, name: str, value: Any, slack: float) -> bool:
-        if name in _REACH_M:
-            return self._within(i, value, _REACH_M[name] * slack)
-        if name in SIDES:
-            return self._beyond(i, value, name.removesuffix("_of"))
-        return _TESTS[name](self, i, value, slack)
-
-    def _within(self, i: int, pattern: str, most_m: float) -> bool:
+    def _within(self, i: int, pattern: str, slack: float, reach_m: float) -> bool:
+        most_m = reach_m * slack
         if most_m >= AT_M and i in self._match(pattern):
             return True  # it is itself one of the things that make the place
         close = set(self._geometry.neighbours(i, most_m))
         return any(self._geometry.gap_m(i, j) <= most_m for j in sorted(self._match(pattern) & close))
 
-    def _beyond(self, i: int, pattern: str, direction: str) -> bool:
+    def _beyond(self, i: int, pattern: str, _slack: float, direction: str) -> bool:
+        """Beyond the centre of things."""
         boxes = self._geometry.boxes[sorted(self._match(pattern) - {i})]
         if len(boxes) == 0:
             return False
@@ -381,8 +348,21 @@ class Places:
         return (dx == 0 or u * dx >= 0.2 / slack) and (dy == 0 or v * dy >= 0.2 / slack)
 
 
+_REACH_M = {"touching": TOUCHING_M, "beside": BESIDE_M, "at": AT_M, "near": NEAR_M}
 _TESTS: Mapping[str, Callable[[Places, int, Any, float], bool]] = {
     "on": Places._on, "roof": Places._roof, "under": Places._under, "inside": Places._inside, "hull": Places._hull,
     "between": Places._between, "over": Places._over, "surface": Places._surface, "by": Places._by,
     "high": Places._high, "z": Places._z, "floor": Places._floor, "among": Places._among, "part": Places._part,
+    **{name: partial(Places._within, reach_m=most_m) for name, most_m in _REACH_M.items()},
+    **{f"{side}_of": partial(Places._beyond, direction=side) for side in ("north", "south", "east", "west")},
 }  # fmt: skip
+# What a key's value must be: a pattern of things or materials, where nothing else is said.
+_FORMS: Mapping[str, Callable[[Any], bool]] = dict.fromkeys([*_TESTS, "say"], _text) | {
+    "also": _texts,
+    "floor": lambda v: isinstance(v, list) and len(v) == 2 and isinstance(v[0], int) and _text(v[1]),
+    "between": lambda v: isinstance(v, list) and len(v) == 2 and all(map(_text, v)),
+    "z": lambda v: isinstance(v, list) and len(v) == 2 and all(map(_number, v)) and v[0] < v[1],
+    "high": _number,
+    "among": _among,
+    "part": lambda v: isinstance(v, str) and v in _PARTS,
+}

@@ -1,24 +1,26 @@
 """Spatial relations between the instances of a scene, computed from their meshes.
 
-Each relation takes a `slack`: with 1 it holds if a person could truly say so, with more if somebody might still think
-so, as for the distractors of a description.
+The one rule of direction: a compass octant from the nearest landmark, from centroid to centroid in the plane. Each
+relation takes a `slack`: with 1 it holds if a person could truly say so, with more if somebody might still think so,
+as for the distractors of a description.
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from aerialdojo_gen.base.cached import cached_method
+from aerialdojo_gen.base.constants import DIRECTIONS
 from aerialdojo_gen.base.kernels import njit
-from aerialdojo_gen.geometry.frames import wrap_angle_rad
+from aerialdojo_gen.geometry.frames import compass_direction, wrap_angle_rad
 from aerialdojo_gen.scenes.context import context_of
 from aerialdojo_gen.scenes.model import Scene
-from aerialdojo_gen.store.schemas import DIRECTIONS
 
 Floats = NDArray[np.float64]
 
@@ -33,6 +35,9 @@ LEVEL_M = 1.5  # less than a storey: things on different floors are not beside e
 COVER_M = 12.0
 BETWEEN_DEG = 120.0
 FRONT_DEG = 60.0
+# Nearer to the border of an octant than this, texts name no direction.
+BORDER_DEG = 5.0
+_HALF_DEG = 22.5
 _LARGE_M = 10.0  # larger things use the projected mesh as outline, smaller ones the convex hull
 _MANY_FACES = 20_000
 _GRID_M = 1e-3
@@ -40,6 +45,39 @@ _GRID_M = 1e-3
 _GRID_SLACK_M = 2.0 * _GRID_M
 _TOUCH_M = 0.35
 _HELD = 3  # of five probes below a thing
+
+
+@dataclass(frozen=True)
+class Bearing:
+    """Index of the nearest landmark in the plane, and the compass direction from it."""
+
+    landmark: int
+    direction: str
+    clear: bool = field(default=True, compare=False)  # At least `BORDER_DEG` from the octant's borders
+
+
+def nearest_landmark(centre_m: NDArray[np.float64], landmarks_m: NDArray[np.float64]) -> Bearing | None:
+    """Find the nearest landmark in the plane (centres in world metres); None where there is no direction."""
+    if len(landmarks_m) == 0:
+        return None
+    offset = np.asarray(centre_m)[:2] - np.asarray(landmarks_m)[:, :2]
+    # Rounded to millimetres, so that the result does not depend on floating-point noise.
+    nearest = int(np.argmin(np.round(np.hypot(offset[:, 0], offset[:, 1]), 3)))
+    dx, dy = float(offset[nearest, 0]), float(offset[nearest, 1])
+    if dx == 0.0 and dy == 0.0:
+        return None
+    direction = compass_direction(dx, dy)
+    return Bearing(nearest, direction, lies_towards(offset[nearest], direction, _HALF_DEG - BORDER_DEG))
+
+
+def lies_towards(offset_m: ArrayLike, direction: str, most_deg: float = _HALF_DEG) -> bool:
+    """Whether a displacement in metres is at most so many degrees off the middle of an octant."""
+    dx, dy = (float(c) for c in np.asarray(offset_m)[:2])
+    return (dx, dy) != (0.0, 0.0) and _off_octant_rad(math.atan2(dy, dx), direction) <= math.radians(most_deg)
+
+
+def _off_octant_rad(bearing_rad: float, direction: str) -> float:
+    return abs(float(wrap_angle_rad(bearing_rad - math.radians(45.0 * DIRECTIONS.index(direction)))))
 
 
 class SceneGeometry:
@@ -251,10 +289,7 @@ class SceneGeometry:
         if not (self._level(i, j, slack) and self._within(i, j, SIDE_M * slack)):
             return False
         bearing = self.bearing_rad(i, j)
-        if bearing is None:
-            return False
-        middle = math.radians(45.0 * DIRECTIONS.index(direction))
-        return abs(float(wrap_angle_rad(bearing - middle))) <= math.radians(22.5) * slack
+        return bearing is not None and _off_octant_rad(bearing, direction) <= math.radians(_HALF_DEG) * slack
 
     def between(self, i: int, j: int, k: int, slack: float = 1.0) -> bool:
         """`i` is between `j` and `k`: close to both, on opposite sides."""

@@ -93,8 +93,7 @@ def _compared(root: DataRoot, scenes: list[str] | None) -> list[Comparison | Lis
     """Read a release, or some scenes of it, and set it beside the paper."""
     from aerialdojo_gen.dataset.contents import check_release
     from aerialdojo_gen.dataset.provenance import made_of_scenes
-    from aerialdojo_gen.dataset.stats.frames import read_goals, read_tasks
-    from aerialdojo_gen.dataset.stats.measures import difficulty_tables, goal_tables
+    from aerialdojo_gen.dataset.stats.measures import difficulty_tables, goal_tables, read_goals, read_tasks
     from aerialdojo_gen.dataset.stats.tables import benchmark_table, tables
 
     made = made_of_scenes(root, check_release(root, scenes))

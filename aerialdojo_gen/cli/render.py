@@ -85,11 +85,11 @@ def render(
 
 
 def _prune(data: Where, scene: list[str] | None) -> None:
-    from aerialdojo_gen.dataset import recordings
+    from aerialdojo_gen.dataset.contents import prune_recordings
 
     if scene:
         raise UsageError("--prune looks at all scenes: leave the scenes out")
-    gone = recordings.prune(data)
+    gone = prune_recordings(data)
     print(f"{len(gone):,} recordings removed: the release does not have their trajectories")
 
 
@@ -129,12 +129,12 @@ def _estimate(
     as_json: bool,
 ) -> None:
     from aerialdojo_gen.base.config.pipeline import with_overrides
-    from aerialdojo_gen.dataset.contents import release_scenes
+    from aerialdojo_gen.dataset.contents import scenes_in_release
     from aerialdojo_gen.pipeline import runner
     from aerialdojo_gen.rendering.estimate import estimate
 
     config, roots = open_pipeline(pipeline, data, reads=True)
-    release_scenes(roots.data)
+    scenes_in_release(roots.data)
     config = with_overrides(config, "render", **overrides)
     scenes = runner.chosen_scenes(config, roots, scene)
     estimated = estimate(roots.data, scenes, config.render, config.seed, workers or default_workers(), share[1])

@@ -121,7 +121,7 @@ def report(
     from aerialdojo_gen.benchmark.paired import paired_tables
     from aerialdojo_gen.benchmark.runs import group_runs, load_runs, with_baselines
     from aerialdojo_gen.benchmark.tables import DEFAULT_RADII_M, ReportRequest
-    from aerialdojo_gen.dataset.contents import release_scenes
+    from aerialdojo_gen.dataset.contents import scenes_in_release
     from aerialdojo_gen.dataset.protocol import read_sample
 
     if as_json:
@@ -132,7 +132,7 @@ def report(
     rules = [profile_named(name) for name in dict.fromkeys(profile or DEFAULT_PROFILES)]
     root, written = open_root(data), open_root(log or data)
     if log is None and not runs_there(root):
-        release_scenes(root)  # a folder without either is the wrong one
+        scenes_in_release(root)  # a folder without either is the wrong one
     sample = read_sample(root) if protocol else None
     named = load_runs(written, runs or (), sample)
     loaded = group_runs(with_baselines(written, named) if add_baselines else named, groups)

@@ -260,7 +260,7 @@ def gallery(
 
 
 def _reference_sheets(out: Path, scene: list[str] | None, data: str, suffix: str) -> None:
-    from aerialdojo_gen.dataset.pictures import pictured_objects, scenes_with_pictures
+    from aerialdojo_gen.dataset.lookup import pictured_objects, scenes_with_pictures
     from aerialdojo_gen.rendering.gallery import reference_sheets, write_picture
 
     root = open_root(data)

@@ -115,7 +115,7 @@ def status(
     pipeline: options.PipelineFile = None, as_json: options.Json = False,
 ) -> None:  # fmt: skip
     """Say which scenes of each stage are fresh, stale or missing; run and write nothing."""
-    from aerialdojo_gen.dataset.status import pipeline_status, status_table
+    from aerialdojo_gen.dataset.build import pipeline_status, status_table
 
     found = pipeline_status(pipeline, data, scenes=merge_scenes(scenes, scene))
     if as_json:

@@ -134,11 +134,11 @@ def validate(
 
 def _name_orphans(release: Release, reporter: Reporter) -> None:
     """Warn of recordings beside the release whose trajectories it does not have."""
-    from aerialdojo_gen.dataset.recordings import orphans
+    from aerialdojo_gen.dataset.contents import orphan_recordings
 
     # Of a release that stands alone nobody knows the recordings; a damaged part is a fault that the checks name.
     with contextlib.suppress(StoreError):
-        if release.folder and (gone := orphans(release.root)):
+        if release.folder and (gone := orphan_recordings(release.root)):
             hint = command("render", "--prune", data=release.root.url)
             reporter.line(
                 f"media/ has {len(gone):,} recordings of trajectories that the release does not have: {hint}"

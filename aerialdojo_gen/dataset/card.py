@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
 from typing import Any
 
 import jinja2
@@ -15,12 +14,11 @@ import pyarrow.compute as pc
 from aerialdojo_gen.base.constants import DETOUR
 from aerialdojo_gen.base.paper_figures import inventory
 from aerialdojo_gen.base.version import __version__
-from aerialdojo_gen.dataset.contents import CARD, TABLES, check_release, counts, meaning, sizes, unit
+from aerialdojo_gen.dataset.contents import CARD, TABLES, check_release, counts, meaning, sizes, unit, write_document
 from aerialdojo_gen.dataset.croissant import CITE_AS
 from aerialdojo_gen.dataset.provenance import made_of_scenes, makers
 from aerialdojo_gen.dataset.stats.comparison import Comparison, Listing
-from aerialdojo_gen.dataset.stats.frames import read_goals, read_tasks
-from aerialdojo_gen.dataset.stats.measures import difficulty_tables, goal_tables
+from aerialdojo_gen.dataset.stats.measures import difficulty_tables, goal_tables, read_goals, read_tasks
 from aerialdojo_gen.dataset.stats.tables import Made
 from aerialdojo_gen.dataset.stats.variety import read_variety, variety_table
 from aerialdojo_gen.store import schemas
@@ -47,12 +45,12 @@ def _hf_type(kind: pa.DataType, indent: int = 4) -> str:
 
 
 def _scene_rows(root: DataRoot, made: list[Made]) -> list[dict[str, Any]]:
-    rows = []
-    for m in made:
-        row = store.read_scene(root, "release/scenes", m.scene).to_pylist()[0]
-        row |= {"landmarks": m.landmarks, "objects": m.objects, "tasks": m.instances, "km": m.path_m / 1000}
-        rows.append(row | {"paper_km": m.paper_scene.path_m / 1000 if m.paper_scene else None})
-    return rows
+    return [
+        store.read_scene(root, "release/scenes", m.scene).to_pylist()[0]
+        | {"landmarks": m.landmarks, "objects": m.objects, "tasks": m.instances, "km": m.path_m / 1000}
+        | {"paper_km": m.paper_scene.path_m / 1000 if m.paper_scene else None}
+        for m in made
+    ]
 
 
 def _attributions(scenes: list[dict[str, Any]]) -> dict[str, list[str]]:
@@ -74,12 +72,9 @@ def _by_setting(made: list[Made], splits: list[str]) -> dict[str, dict[str, int]
 
 def _example(root: DataRoot, scenes: list[str]) -> dict[str, Any] | None:
     """Return the first semantic task of the shortest setting there is."""
-    for scene in scenes:
-        for subset in ("train", "test"):
-            tasks = store.read_scene(root, f"tasks/{subset}", scene)
-            for example in tasks.filter(pc.equal(tasks["modality"], "semantic")).slice(0, 1).to_pylist():
-                return dict(example)
-    return None
+    parts = (store.read_scene(root, f"tasks/{subset}", scene) for scene in scenes for subset in ("train", "test"))
+    found = (tasks.filter(pc.equal(tasks["modality"], "semantic")).slice(0, 1).to_pylist() for tasks in parts)
+    return next((rows[0] for rows in found if rows), None)
 
 
 def _of_paper(made: Made) -> bool:
@@ -158,10 +153,6 @@ def render_card(data: Where) -> str:
     )
 
 
-def write_card(data: Where) -> Path:
+def write_card(data: Where) -> None:
     """Write ``release/README.md`` from what the release holds."""
-    root = open_root(data)
-    text = render_card(root)
-    with root.commit(CARD) as path:
-        path.write_text(text, encoding="utf-8")
-    return root.local_copy(CARD)
+    write_document(data, CARD, render_card(data))

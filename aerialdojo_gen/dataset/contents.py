@@ -1,4 +1,4 @@
-"""What a release consists of, and whether all of it is there: tables, splits, rows, bytes."""
+"""What a release consists of, whether all of it is there, and which recordings belong to no trajectory of it."""
 
 from __future__ import annotations
 
@@ -95,34 +95,33 @@ def prune_release(where: Where, scenes: Sequence[str]) -> list[str]:
     return gone
 
 
-def release_scenes(where: Where, folder: str = FOLDER) -> list[str]:
-    """List the scenes of a release, by name; one that lacks a part is listed too."""
+def scenes_in_release(where: Where, patterns: Sequence[str] | None = None, folder: str = FOLDER) -> list[str]:
+    """Resolve names and globs to scenes of a release, by name; all of them if there are no patterns.
+
+    A scene that lacks a part is among them.
+    """
     root = open_root(where)
     scenes = existing_scenes(root, folder)
     if not scenes:
         raise no_release(root, folder)
-    return scenes
+    return choose_scenes(patterns, scenes)
 
 
-def scenes_in_release(where: Where, patterns: Sequence[str] | None = None, folder: str = FOLDER) -> list[str]:
-    """Resolve names and globs to scenes of a release, by name; all of them if there are no patterns."""
-    return choose_scenes(patterns, release_scenes(where, folder))
+def write_document(where: Where, name: str, text: str) -> None:
+    """Write a file that stands beside the tables, whole or not at all."""
+    with open_root(where).commit(name) as path:
+        path.write_text(text, encoding="utf-8")
 
 
 def no_release(where: Where, folder: str = FOLDER) -> StoreError:
     """Return the error for a missing release: the folder, what is missing, and what to do."""
     root = open_root(where)
     place = root.url if folder in ("", FOLDER) else root.at(folder)
-    return StoreError(
-        f"there is no release in {place}: {_missing_part(root, folder)}; "
-        f"name its folder with --data, or make one with {_make_command()}"
-    )
-
-
-def _make_command() -> str:
-    """Return the command that makes the dataset; a wheel has no Makefile."""
-    here = (Path(__file__).resolve().parents[2] / "Makefile").is_file()
-    return "make dataset" if here else f"{current_context().program} run aerialdojo-200k"
+    # A wheel has no Makefile.
+    has_makefile = (Path(__file__).resolve().parents[2] / "Makefile").is_file()
+    make = "make dataset" if has_makefile else f"{current_context().program} run aerialdojo-200k"
+    lack = _missing_part(root, folder)
+    return StoreError(f"there is no release in {place}: {lack}; name its folder with --data, or make one with {make}")
 
 
 def _missing_part(root: DataRoot, folder: str) -> str:
@@ -217,3 +216,29 @@ def meaning(field: pa.Field) -> str:
 def unit(field: pa.Field) -> str:
     """A column's unit, from its metadata; empty where it has none."""
     return field.metadata.get(b"unit", b"").decode()
+
+
+def orphan_recordings(where: Where) -> list[str]:
+    """List the folders of recordings, relative to the data root, whose trajectories the release does not have."""
+    root = open_root(where)
+    folders = [PurePosixPath(name).parent for name in root.list("media", "*/*/recording.json")]
+    routes = {
+        (scene, nav_id)
+        for scene in {*scenes_in_release(root)} & {folder.parent.name for folder in folders}
+        for side in ("train", "test")
+        for nav_id in store.read_scene(root, f"routes/{side}", scene, ["nav_id"])["nav_id"].to_pylist()
+    }
+    return sorted(str(folder) for folder in folders if (folder.parent.name, folder.name) not in routes)
+
+
+def prune_recordings(where: Where) -> list[str]:
+    """Remove the folders of `orphan_recordings`; returns them. StoreError as there, or where a run holds the data."""
+    root = open_root(where)
+    with root.lock():
+        gone = orphan_recordings(root)
+        for folder in gone:
+            root.delete(folder)
+        for scene in {folder.rpartition("/")[0] for folder in gone}:
+            if not root.list(scene):
+                root.delete(scene)
+    return gone

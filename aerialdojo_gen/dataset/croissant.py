@@ -3,14 +3,22 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
 
 from aerialdojo_gen.base.version import __version__
-from aerialdojo_gen.dataset.contents import CROISSANT, TABLES, Table, check_release, counts, meaning, unit
-from aerialdojo_gen.store.root import Where, open_root
+from aerialdojo_gen.dataset.contents import (
+    CROISSANT,
+    TABLES,
+    Table,
+    check_release,
+    counts,
+    meaning,
+    unit,
+    write_document,
+)
+from aerialdojo_gen.store.root import Where
 
 # Of this version's output. Not the day of the run: the same sources give the same bytes on any day.
 PUBLISHED = "2026-11-21"
@@ -119,31 +127,23 @@ def _field(table: str, name: str, about: Document, kind: Document, source: Docum
     return own | about | kind | {"source": {"fileSet": {"@id": f"{table}-files"}} | source}
 
 
-def _column(table: str, field: pa.Field) -> Document:
-    about = {"description": meaning(field) + (f"; unit: {unit(field)}" if unit(field) else "")}
-    kind, repeated = _kind(field)
+def _column(table: str, field: pa.Field, within: str = "") -> Document:
+    """Describe a column, or a part of the structures within one."""
+    is_list = pa.types.is_list(field.type)
+    kind = field.type.value_type if is_list else field.type
     if pa.types.is_struct(kind):
-        shape: Document = {"subField": [_sub_field(table, field.name, part) for part in kind]}
+        shape: Document = {"subField": [_column(table, part, field.name) for part in kind]}
     else:
         shape = {"dataType": _TYPES[kind]}
-    return _field(table, field.name, about, shape | repeated, {"extract": {"column": field.name}})
+    shape |= {"repeated": True} if is_list else {}
+    if within:
+        source = {"extract": {"column": within}, "transform": {"jsonPath": field.name}}
+        return _field(table, f"{within}/{field.name}", {}, shape, source)
+    about = {"description": meaning(field) + (f"; unit: {unit(field)}" if unit(field) else "")}
+    return _field(table, field.name, about, shape, {"extract": {"column": field.name}})
 
 
-def _sub_field(table: str, column: str, field: pa.Field) -> Document:
-    kind, repeated = _kind(field)
-    source = {"extract": {"column": column}, "transform": {"jsonPath": field.name}}
-    return _field(table, f"{column}/{field.name}", {}, {"dataType": _TYPES[kind]} | repeated, source)
-
-
-def _kind(field: pa.Field) -> tuple[pa.DataType, Document]:
-    """Type of a field's values, and what says that there are several."""
-    return (field.type.value_type, {"repeated": True}) if pa.types.is_list(field.type) else (field.type, {})
-
-
-def write_croissant(data: Where) -> Path:
+def write_croissant(data: Where) -> None:
     """Write ``release/croissant.json`` from what the release holds."""
-    root = open_root(data)
-    found = counts(root, check_release(root))
-    with root.commit(CROISSANT) as path:
-        path.write_text(json.dumps(croissant(found), indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
-    return root.local_copy(CROISSANT)
+    found = croissant(counts(data, check_release(data)))
+    write_document(data, CROISSANT, json.dumps(found, indent=1, ensure_ascii=False) + "\n")

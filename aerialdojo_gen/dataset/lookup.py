@@ -6,6 +6,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import PurePosixPath
 from typing import Any
 
 import numpy as np
@@ -13,16 +14,18 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
+from aerialdojo_gen.annotations.language.sides import described
 from aerialdojo_gen.base.cli_context import command
 from aerialdojo_gen.base.errors import AssetError, StoreError, UsageError
-from aerialdojo_gen.base.names import closest, unknown
-from aerialdojo_gen.dataset.contents import release_scenes
+from aerialdojo_gen.base.names import choose_scenes, closest, unknown
+from aerialdojo_gen.dataset.contents import existing_parts, no_release, scenes_in_release
 from aerialdojo_gen.planning.collision import collision_world
 from aerialdojo_gen.scenes.context import SEVERAL, open_scene
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.scenes.stored import mesh_copy
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import DataRoot, Where, open_root
+from aerialdojo_gen.store.shards import read_scene, shards
 
 _TASK_ID = re.compile(r"(?P<nav>(?P<scene>[A-Za-z0-9][A-Za-z0-9_-]*)-(?P<key>[0-9a-f]{12}))(?:-[si])?")
 SIDES = ("train", "test")
@@ -40,7 +43,7 @@ class ReleasedScene:
 
     def __init__(self, data: Where, name: str) -> None:
         self.root = open_root(data)
-        known = release_scenes(self.root)
+        known = scenes_in_release(self.root)
         if name not in known:
             raise UsageError(unknown(f"the release in {self.root} has no scene", name, known, most=3))
         self.name = name
@@ -153,7 +156,7 @@ class TaskRecord:
 def find_task(data: Where, task_id: str) -> TaskRecord:
     """Find a task by its ``task_id`` or ``nav_id``; UsageError, which names the nearest, if there is none."""
     root = open_root(data)
-    known = release_scenes(root)
+    known = scenes_in_release(root)
     match = _TASK_ID.fullmatch(task_id)
     listing = f'tasks are listed by pandas.read_parquet({f"{root}/release/tasks"!r})["task_id"]'
     if match is None:
@@ -176,3 +179,25 @@ def find_task(data: Where, task_id: str) -> TaskRecord:
             f"run {command('split', scene=scene.name)}"
         )
     return TaskRecord(scene, nav_id, scene.route(nav_id), instances)
+
+
+def scenes_with_pictures(where: Where, patterns: Sequence[str] | None = None) -> list[str]:
+    """List the scenes that have reference pictures."""
+    root = open_root(where)
+    folders = {PurePosixPath(path).name for path in root.list("references")}
+    staged = {scene for scene in folders if shards(root, "references", scene)}
+    there = sorted(staged | set(existing_parts(root)["release/objects"]))
+    if not there:
+        raise no_release(root)
+    return choose_scenes(patterns, there)
+
+
+def pictured_objects(where: Where, scene: str) -> list[dict[str, Any]]:
+    """Read a scene's objects with their pictures: rows of `objects`, `descriptions` and `references` together."""
+    root = open_root(where)
+    if not shards(root, "references", scene):
+        rows: list[dict[str, Any]] = read_scene(root, "release/objects", scene).to_pylist()
+        return rows
+    table = described(read_scene(root, "objects", scene), read_scene(root, "descriptions", scene))
+    objects = {row["object_id"]: row for row in table.to_pylist()}
+    return [objects[row["object_id"]] | row for row in read_scene(root, "references", scene).to_pylist()]

@@ -16,13 +16,13 @@ import pyarrow.compute as pc
 from aerialdojo_gen.base import rng
 from aerialdojo_gen.base.cli_context import command
 from aerialdojo_gen.base.constants import MODALITIES
-from aerialdojo_gen.base.errors import StoreError, UsageError
-from aerialdojo_gen.base.names import unknown
+from aerialdojo_gen.base.errors import StoreError
+from aerialdojo_gen.base.names import check_known
 from aerialdojo_gen.base.safe_parse import read_json
-from aerialdojo_gen.dataset.contents import FOLDER, existing_scenes, release_scenes
+from aerialdojo_gen.dataset.contents import FOLDER, existing_scenes, scenes_in_release, write_document
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.layout import partition
-from aerialdojo_gen.store.root import DataRoot, Where, open_root
+from aerialdojo_gen.store.root import Where, open_root
 from aerialdojo_gen.store.schemas import FAMILIES
 
 PROTOCOLS = ("paper",)
@@ -77,8 +77,7 @@ class Sample:
 
 def check_protocol(name: str | None) -> str:
     """Return a protocol's name, empty for none; UsageError for an unknown one."""
-    if name and name not in PROTOCOLS:
-        raise UsageError(unknown("no protocol", name, PROTOCOLS))
+    check_known("no protocol", [name] if name else [], PROTOCOLS)
     return name or ""
 
 
@@ -90,7 +89,7 @@ def draw_sample(data: Where) -> Sample:
     """
     root = open_root(data)
     best: dict[tuple[str, str], tuple[tuple[int, int], str, dict[str, tuple[str, ...]]]] = {}
-    for scene in release_scenes(root):
+    for scene in scenes_in_release(root):
         rows = store.read_scene(root, "tasks/test", scene, _COLUMNS).to_pydict()
         if not rows["task_id"]:
             continue
@@ -114,10 +113,8 @@ def _draw(rows: Mapping[str, Sequence[str]]) -> dict[tuple[str, str], list[str]]
 
 def write_sample(data: Where) -> None:
     """Write ``release/protocol.json`` from what the release holds."""
-    root = open_root(data)
-    text = json.dumps({"protocol": "paper", "about": _ABOUT, "tasks": draw_sample(root).tasks}, indent=1) + "\n"
-    with root.commit(SAMPLE) as path:
-        path.write_text(text, encoding="utf-8")
+    found = {"protocol": "paper", "about": _ABOUT, "tasks": draw_sample(data).tasks}
+    write_document(data, SAMPLE, json.dumps(found, indent=1) + "\n")
 
 
 def read_sample(data: Where) -> Sample:
@@ -141,5 +138,4 @@ def _well_formed(own: object) -> bool:
 
 def sample_shortfall(data: Where) -> str:
     """Say in one line what the paper's sample has that a release does not; empty if it has all of it."""
-    root: DataRoot = open_root(data)
-    return read_sample(root).shortfall(existing_scenes(root))
+    return read_sample(data).shortfall(existing_scenes(data))

@@ -12,7 +12,7 @@ from typing import Any
 
 from aerialdojo_gen.base.config.pipeline import Pipeline
 from aerialdojo_gen.base.errors import StoreError, UsageError
-from aerialdojo_gen.dataset.contents import FOLDER, existing_scenes
+from aerialdojo_gen.dataset.contents import FOLDER, existing_scenes, write_document
 from aerialdojo_gen.dataset.stats.tables import Made, in_paper_order, made_of
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import DataRoot, Where, open_root
@@ -97,8 +97,7 @@ def record_makers(data: Where, pipeline: Pipeline, scenes: Sequence[str]) -> Non
     with contextlib.suppress(OSError, UnicodeDecodeError):
         if root.local_copy(RECORD).read_text(encoding="utf-8") == text:
             return
-    with root.commit(RECORD) as path:
-        path.write_text(text, encoding="utf-8")
+    write_document(root, RECORD, text)
 
 
 def check_replaced(data: Where, pipeline: Pipeline, scenes: Sequence[str], *, whole: bool) -> None:
@@ -126,12 +125,8 @@ def check_replaced(data: Where, pipeline: Pipeline, scenes: Sequence[str], *, wh
 
 def _listed(root: DataRoot, scenes: list[str]) -> str:
     names = ", ".join(scenes[:4]) + (", …" if len(scenes) > 4 else "")
-    tasks = sum(_tasks(root, scene) for scene in scenes)
+    tasks = 0
+    for scene in scenes:
+        with contextlib.suppress(StoreError):
+            tasks += sum(store.count_rows(root, table, scene) for table in ("tasks/train", "tasks/test"))
     return f"{len(scenes)} scene{'s' * (len(scenes) > 1)} with {tasks:,} tasks ({names})"
-
-
-def _tasks(root: DataRoot, scene: str) -> int:
-    try:
-        return sum(store.count_rows(root, table, scene) for table in ("tasks/train", "tasks/test"))
-    except StoreError:
-        return 0

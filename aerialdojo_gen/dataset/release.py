@@ -11,9 +11,9 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from aerialdojo_gen.base.errors import UsageError
-from aerialdojo_gen.base.names import unknown
+from aerialdojo_gen.base.names import as_names, check_known
 from aerialdojo_gen.base.pictures import decode_rgb
-from aerialdojo_gen.dataset.contents import scenes_in_release
+from aerialdojo_gen.dataset.contents import TABLES, scenes_in_release
 from aerialdojo_gen.dataset.lookup import SIDES, ReleasedScene, TaskRecord, find_task, read_side
 from aerialdojo_gen.rendering.reader import Recording, read_recording
 from aerialdojo_gen.scenes.model import Scene
@@ -21,8 +21,6 @@ from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import DataRoot, open_root
 from aerialdojo_gen.store.schemas import SUBSETS
 
-TABLES = ("tasks", "routes", "objects", "landmarks", "anchors", "viewpoints", "scenes")
-_SPLIT = ("tasks", "routes")
 # Each keeps its mesh once that is read, 10 to 100 MB.
 _MAX_SCENES = 4
 
@@ -88,24 +86,18 @@ class Release:
         StoreError
             A part is missing or damaged.
         """
-        if name not in TABLES:
-            raise UsageError(unknown("no table", name, TABLES))
-        splits = _names(split) or SUBSETS
-        for one in splits:
-            if one not in SUBSETS:
-                raise UsageError(unknown("no split", one, SUBSETS))
-        if split is not None and name not in _SPLIT:
+        check_known("no table", [name], TABLES)
+        table_of = TABLES[name]
+        splits = as_names(SUBSETS if split is None else split) or SUBSETS
+        check_known("no split", splits, SUBSETS)
+        if split is not None and not table_of.split:
             raise UsageError(f"{name} is one table, not split: leave split out")
-        key = f"{name}/train" if name in _SPLIT else f"release/{name}"
-        schema = store.LAYOUT[key].spec.schema
-        read = None if columns is None else [column for column in columns if column != "split" or name not in _SPLIT]
-        for column in read or ():
-            if column not in schema.names:
-                raise UsageError(unknown(f"no column of {name}", column, schema.names))
+        read = None if columns is None else [column for column in columns if column != "split" or not table_of.split]
+        check_known(f"no column of {name}", read or (), table_of.spec.schema.names)
         parts = []
-        for scene_name in scenes_in_release(self._data, _names(scene)):
-            if name not in _SPLIT:
-                parts.append(store.read_scene(self._data, key, scene_name, read))
+        for scene_name in scenes_in_release(self._data, None if scene is None else as_names(scene)):
+            if not table_of.split:
+                parts.append(store.read_scene(self._data, f"release/{name}", scene_name, read))
                 continue
             sides = [side for side in SIDES if f"{store.partition(scene_name)}_{side}" in splits]
             parts += [read_side(self._data, name, side, scene_name, read) for side in sides]
@@ -192,7 +184,3 @@ def open_release(data: str | Path | DataRoot = "data") -> Release:
         There is no release.
     """
     return Release(data)
-
-
-def _names(given: str | Sequence[str] | None) -> tuple[str, ...]:
-    return () if given is None else (given,) if isinstance(given, str) else tuple(given)

@@ -15,9 +15,9 @@ from aerialdojo_gen.annotations.draft import (
     SCENERY,
     AnnotationDrafter,
     DraftOptions,
+    choose_landmarks,
 )
 from aerialdojo_gen.annotations.format import Annotations, write_annotations
-from aerialdojo_gen.annotations.landmarks import choose_landmarks
 from aerialdojo_gen.annotations.vocabulary import Vocabulary
 from aerialdojo_gen.base.cli_context import command
 from aerialdojo_gen.base.config.pipeline import Pipeline

@@ -10,8 +10,7 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
-from aerialdojo_gen.annotations.appearance import SHADES
-from aerialdojo_gen.annotations.vocabulary import UNKNOWN
+from aerialdojo_gen.annotations.vocabulary import SHADES, UNKNOWN
 from aerialdojo_gen.imports.naming import word_list
 from aerialdojo_gen.imports.raw import RawNode
 from aerialdojo_gen.scenes.colours import colour_words, shown_colours

@@ -10,11 +10,10 @@ from pathlib import Path
 import pytest
 from support.annotation_scenes import PAINTS, box, street
 
-from aerialdojo_gen.annotations.check import check_source
+from aerialdojo_gen.annotations.check import SourceCheck
 from aerialdojo_gen.annotations.claims import SceneClaims
-from aerialdojo_gen.annotations.draft import AnnotationDrafter, DraftOptions
+from aerialdojo_gen.annotations.draft import AnnotationDrafter, DraftOptions, choose_landmarks
 from aerialdojo_gen.annotations.format import Annotations, format_annotations, parse_annotations
-from aerialdojo_gen.annotations.landmarks import choose_landmarks
 from aerialdojo_gen.annotations.language.writer import Writer
 from aerialdojo_gen.annotations.phrases import article, noun_of, words_of
 from aerialdojo_gen.annotations.vocabulary import Vocabulary
@@ -59,7 +58,7 @@ def test_a_landmark_rises_through_the_ceiling_but_stands_below_it(plaza, catalog
     landmarks = choose_landmarks(Vocabulary(scene, catalogue), 2, at_most=True)
     assert {mark.name for mark in landmarks} == ({"radio mast", "clock tower"} if chosen else {"clock tower"})
     source = parse_annotations(format_annotations(Annotations(scene.name, landmarks, ())))
-    assert check_source(source, Vocabulary(scene, catalogue)).faults == []
+    assert SourceCheck(source, Vocabulary(scene, catalogue)).faults == []
 
 
 def test_drafts_pass_the_checks_and_are_the_same_each_time(plaza, catalogue):
@@ -67,7 +66,7 @@ def test_drafts_pass_the_checks_and_are_the_same_each_time(plaza, catalogue):
     text = format_annotations(draft)
     assert text == format_annotations(draft_annotations(plaza, catalogue, 1, 20, seed=3))
     assert text != format_annotations(draft_annotations(plaza, catalogue, 1, 20, seed=4))
-    assert check_source(parse_annotations(text), Vocabulary(plaza, catalogue), (1, 20)).faults == []
+    assert SourceCheck(parse_annotations(text), Vocabulary(plaza, catalogue), (1, 20)).faults == []
 
 
 def test_drafts_are_varied_english(plaza, catalogue):

@@ -16,9 +16,9 @@ from aerialdojo_gen.annotations.format import (
     Object,
     format_annotations,
     parse_annotations,
+    read_json,
     write_annotations,
 )
-from aerialdojo_gen.annotations.positions import read_json
 
 _number = st.floats(-1e6, 1e6)
 _anchor = st.builds(Anchor, position_m=st.tuples(_number, _number, _number), yaw_deg=_number)

@@ -10,13 +10,11 @@ import pytest
 from support.annotation_scenes import PAINTS, box, street, street_annotations, street_vocabulary
 from support.catalogue_faults import MIN_TRUE_PHRASES
 
-from aerialdojo_gen.annotations.appearance import colour_shares, repeats, unsupported_colours
-from aerialdojo_gen.annotations.check import check_source
+from aerialdojo_gen.annotations.check import SourceCheck
 from aerialdojo_gen.annotations.claims import Claim, SceneClaims
 from aerialdojo_gen.annotations.format import format_annotations, parse_annotations
-from aerialdojo_gen.annotations.ground import Surface
 from aerialdojo_gen.annotations.relations import DISTRACTOR_SLACK
-from aerialdojo_gen.annotations.vocabulary import Vocabulary
+from aerialdojo_gen.annotations.vocabulary import Surface, Vocabulary, colour_shares, repeats, unsupported_colours
 from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.scenes.appearances import valid_phrases
 from aerialdojo_gen.scenes.model import Material, Part, Scene
@@ -44,7 +42,7 @@ def test_a_colour_that_the_surface_does_not_have_is_a_fault():
     grey = box("x_0", (30, 32, 0), (5, 2, 2.5)).parts
     things = (dataclasses.replace(i, parts=grey) if i.node == "delivery_van_002" else i for i in street().instances)
     source = parse_annotations(format_annotations(street_annotations()))
-    faults = check_source(source, street_vocabulary(dataclasses.replace(street(), instances=tuple(things)))).faults
+    faults = SourceCheck(source, street_vocabulary(dataclasses.replace(street(), instances=tuple(things)))).faults
     assert any("'blue' is not so of delivery_van_002" in fault.message for fault in faults)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from support.annotation_scenes import GOOD, PAINTS, box, street, street_annotations, street_vocabulary
 
-from aerialdojo_gen.annotations.check import check_source
+from aerialdojo_gen.annotations.check import SourceCheck
 from aerialdojo_gen.annotations.claims import Claim, Mention, SceneClaims
 from aerialdojo_gen.annotations.format import Landmark, format_annotations, parse_annotations
 from aerialdojo_gen.annotations.matching import Matcher
@@ -20,7 +20,7 @@ from aerialdojo_gen.scenes.build import build_scene
 from aerialdojo_gen.scenes.model import Material, Scene
 
 TOWER = Landmark(id=0, name="clock tower", node="clock_tower_000")
-YELLOW_MAILBOX = Mention("", "mailbox", ("yellow",))
+YELLOW_MAILBOX = Mention("", "mailbox", ("yellow",), False)
 
 
 class _Street:
@@ -136,7 +136,7 @@ def test_relations_are_read_as_strictly_as_they_are_meant(gap_m, word, so):
 
 def _faults(**texts: str) -> list[str]:
     source = parse_annotations(format_annotations(street_annotations(**texts)))
-    return [fault.message for fault in check_source(source, street_vocabulary()).faults]
+    return [fault.message for fault in SourceCheck(source, street_vocabulary()).faults]
 
 
 def test_twins_are_told_apart_in_the_first_sentence_of_few():
@@ -187,7 +187,7 @@ def test_the_import_refuses_a_van_that_is_called_a_bench(project, catalogue):
 
     def faults(imported=False):
         words = Vocabulary(dataclasses.replace(scene, imported=imported), catalogue)
-        return check_source(parse_annotations(json.dumps(document)), words).faults
+        return SourceCheck(parse_annotations(json.dumps(document)), words).faults
 
     assert faults() == []
     k, entry = next((k, e) for k, e in enumerate(document["objects"]) if e["category"] == "delivery_van")

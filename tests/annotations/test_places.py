@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from support.annotation_scenes import PAINTS, box, street, street_annotations, street_vocabulary
 
-from aerialdojo_gen.annotations.check import check_source
+from aerialdojo_gen.annotations.check import SourceCheck
 from aerialdojo_gen.annotations.format import format_annotations, parse_annotations
 from aerialdojo_gen.annotations.places import Places, check_conditions, check_phrases, places_of
 from aerialdojo_gen.annotations.relations import SceneGeometry
@@ -104,7 +104,7 @@ def test_a_wording_belongs_to_one_phrase_and_may_replace_it(yard):
     said = {"surface": "grey", "say": "out in the Yard", "also": ["amid the cars"]}
     phrases = {"in the yard": said, "by the wall": {"beside": "wall_000"}}
     check_phrases("[U_Yard_0]", phrases)
-    assert Places(SceneGeometry(yard), phrases).wordings("in the yard") == ("out in the Yard", "amid the cars")
+    assert Places(SceneGeometry(yard), phrases).wordings["in the yard"] == ("out in the Yard", "amid the cars")
     with pytest.raises(AnnotationError, match="'by the wall': 'by the wall' is a wording of 'in the yard' too"):
         check_phrases("[U_Yard_0]", phrases | {"in the yard": said | {"also": ["By the wall"]}})
 
@@ -120,7 +120,7 @@ def _faults(place: str, says: str) -> list[str]:
         street_annotations(delivery_van_002=says, mailbox_001="A red mailbox under the canopy.")
     )
     objects = parse_annotations(text.replace("U_Street_0", "U_Factory_1"))
-    found = check_source(objects, street_vocabulary(scene)).faults
+    found = SourceCheck(objects, street_vocabulary(scene)).faults
     return [fault.message for fault in found if fault.path.startswith("objects[2]")]
 
 

@@ -28,7 +28,7 @@ from aerialdojo_gen.benchmark.episodes import read_run
 from aerialdojo_gen.benchmark.runner import Evaluation, evaluate
 from aerialdojo_gen.benchmark.tasks import Selection
 from aerialdojo_gen.dataset.episode import Episode
-from aerialdojo_gen.dataset.validate import oracle
+from aerialdojo_gen.dataset.validate import flights
 from aerialdojo_gen.dataset.validate.parts import read_tables, release_of
 from aerialdojo_gen.dataset.validate.rows import SceneData
 from aerialdojo_gen.geometry.cameras import view_pose
@@ -282,7 +282,7 @@ def test_each_fault_is_found_and_only_it(planted):
     for row, (actions, _) in faults.items():
         lists[row] = actions
     table = with_column(routes.table, "agent_action", pa.array(lists, list_of(pa.int8())))
-    found = {f.row: f.found for f in oracle.agent_action_fails(data, dataclasses.replace(routes, table=table))}
+    found = {f.row: f.found for f in flights.agent_action_fails(data, dataclasses.replace(routes, table=table))}
     assert found.keys() == faults.keys()
     for row, (_, words) in faults.items():
         assert words in found[row], found[row]

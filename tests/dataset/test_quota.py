@@ -59,20 +59,15 @@ def pool(n, seed):
     return [f"U_Test_0-{k:012x}" for k in rng.permutation(n)], settings.tolist(), lengths
 
 
-def test_a_length_out_of_reach_takes_the_nearest():
+def test_lengths_out_of_reach_take_the_nearest_other_seeds_other_tasks_and_all_where_all_are_wanted():
     ids, setting, lengths = pool(300, 3)
-    wanted = {"base": 40}
-    bases = np.sort(lengths[np.asarray(setting) == "base"])
-    least = lengths[select_quota(Accepted(ids, setting, lengths), wanted, 1.0, 0)].sum()
-    most = lengths[select_quota(Accepted(ids, setting, lengths), wanted, 1e9, 0)].sum()
-    assert least == pytest.approx(bases[:40].sum(), rel=0.02)
-    assert most == pytest.approx(bases[-40:].sum(), rel=0.02)
-
-
-def test_another_seed_releases_other_tasks():
-    ids, setting, lengths = pool(300, 3)
-    chosen = {select_quota(Accepted(ids, setting, lengths), {"base": 40}, 700.0, seed).tobytes() for seed in range(4)}
-    assert len(chosen) == 4
+    accepted, bases = Accepted(ids, setting, lengths), np.sort(lengths[np.asarray(setting) == "base"])
+    for path_m, nearest in ((1.0, bases[:40]), (1e9, bases[-40:])):
+        chosen = lengths[select_quota(accepted, {"base": 40}, path_m, 0)]
+        assert chosen.sum() == pytest.approx(nearest.sum(), rel=0.02)
+    assert len({select_quota(accepted, {"base": 40}, 700.0, seed).tobytes() for seed in range(4)}) == 4
+    every = {s: setting.count(s) for s in SETTINGS}
+    assert select_quota(Accepted(ids, setting, lengths, np.arange(300) % 3), every, 1.0, 0, 50.0).all()
 
 
 @settings(max_examples=10)
@@ -101,12 +96,6 @@ def test_numbers_and_metres_hold_and_harder_tasks_are_preferred(seed, longer, pr
     assert (select_quota(alike, wanted, path_m, seed, preference) == plain).all()
 
 
-def test_where_all_candidates_are_wanted_nothing_is_preferred():
-    ids, setting, lengths = pool(300, 5)
-    wanted = {s: setting.count(s) for s in SETTINGS}
-    assert select_quota(Accepted(ids, setting, lengths, np.arange(300) % 3), wanted, 1.0, 0, 50.0).all()
-
-
 def test_what_is_not_known_is_not_hard():
     known = difficulty_level(np.array([1.04, 1.05, np.nan, np.nan]), np.array([0.01, 0.0, 0.0, np.nan]))
     assert known.tolist() == [0, 2, 1, 0]
@@ -122,20 +111,14 @@ def test_held_out_objects_are_a_share_of_their_scene_by_the_salt(objects, fracti
     assert out <= held_out("U_Test_0", sorted(objects), 1.0, key) == objects
 
 
-def test_another_salt_or_scene_holds_out_other_objects():
-    sets = [
-        held_out(scene, range(200), 0.2, key_of(salt, 0))
-        for scene in ("U_A_0", "U_B_0") for salt in ("a salt of one's own", "another of one's own")
-    ]  # fmt: skip
+def test_another_salt_or_scene_holds_out_other_objects_and_ids_of_pictures_do_not_tell_which():
+    keys = [key_of(salt, 0) for salt in ("a salt of one's own", "another of one's own")]
+    sets = [held_out(scene, range(200), 0.2, key) for scene in ("U_A_0", "U_B_0") for key in keys]
     assert all(len(out) == 40 for out in sets)
     assert len({frozenset(out) for out in sets}) == 4
-
-
-def test_the_ids_of_pictures_do_not_tell_which_objects_are_held_out():
-    key = key_of("a salt of one's own", 0)
-    by_id = sorted(range(200), key=lambda k: reference_id("U_A_0", k, key))
+    by_id = sorted(range(200), key=lambda k: reference_id("U_A_0", k, keys[0]))
     # By chance a fifth of the 40 that come first.
-    assert len(held_out("U_A_0", range(200), 0.2, key) & set(by_id[:40])) < 20
+    assert len(sets[0] & set(by_id[:40])) < 20
 
 
 def judged(data, scene, kept):

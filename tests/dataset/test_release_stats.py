@@ -15,13 +15,11 @@ from support.command_line import called
 from aerialdojo_gen.base.paper_figures import inventory, splits
 from aerialdojo_gen.dataset.contents import check_release
 from aerialdojo_gen.dataset.stats.comparison import as_csv, as_markdown
-from aerialdojo_gen.dataset.stats.figures.charts import composition
-from aerialdojo_gen.dataset.stats.figures.maps import _round_length
-from aerialdojo_gen.dataset.stats.figures.ranking import _ranking
-from aerialdojo_gen.dataset.stats.figures.style import SETTING_COLOURS, save
-from aerialdojo_gen.dataset.stats.frames import read_goals, read_tasks
-from aerialdojo_gen.dataset.stats.measures import difficulty_tables, goal_tables
+from aerialdojo_gen.dataset.stats.figures import _round_length
+from aerialdojo_gen.dataset.stats.figures.charts import SETTING_COLOURS, _ranking, composition, save
+from aerialdojo_gen.dataset.stats.measures import difficulty_tables, goal_tables, read_goals, read_tasks
 from aerialdojo_gen.dataset.stats.tables import Made, benchmark_table, in_paper_order, made_of, tables
+from aerialdojo_gen.dataset.stats.variety import measure, read_variety, self_bleu, variety_table, words_of
 from aerialdojo_gen.pipeline.stages.work.candidate_policy import train_quotas
 from aerialdojo_gen.store import schemas
 
@@ -45,13 +43,6 @@ def papers():
     return in_paper_order([as_the_paper(name) for name in sorted(inventory())])
 
 
-def test_what_is_the_papers_is_said_to_be(papers):
-    for table in tables(papers)[1:4]:
-        assert table.unlike == 0
-        assert table.terminal()[-1] == f"All {table.compared} counts are the paper's."
-    assert [table.compared for table in tables(papers)] == [0, 5 * 9, 43 * 6, 5 * 4, 0, 0]
-
-
 def test_the_tables_of_42_scenes_fit_a_terminal(papers):
     for table in tables(papers):
         lines = table.terminal()
@@ -66,17 +57,35 @@ def test_the_tables_of_42_scenes_fit_a_terminal(papers):
     assert len(ends) == 1
 
 
-def test_totals_are_the_papers_own(papers):
-    total = {row.name: row.ours[0] for row in tables(papers)[0].rows}
+def test_a_release_of_the_papers_counts_has_its_totals_splits_shares_and_lengths(papers):
+    whole, families, _, split, share, length = made = tables(papers)
+    for table in made[1:4]:
+        assert table.unlike == 0
+        assert table.terminal()[-1] == f"All {table.compared} counts are the paper's."
+    assert [table.compared for table in made] == [0, 5 * 9, 43 * 6, 5 * 4, 0, 0]
+    total = {row.name: row.ours[0] for row in whole.rows}
     counts = {"scenes": 42, "scene types": 21, "landmarks": 109, "objects": 2099, "instances": 205_732,
               "navigation tasks": 102_866}  # fmt: skip
     assert {name: total[name] for name in counts} == counts
     assert total["routes in all, km"] == pytest.approx(4_115.313, abs=0.5)
     assert sum(total[f"instances, {s}"] for s in ("base", "standard", "long-horizon")) == 205_732
-    by_split = {row.name: row.ours[-1] for row in tables(papers)[3].rows}
-    assert by_split == {
-        "ID train": 113_642, "ID test": 28_452, "OOD train": 12_712, "OOD test": 50_926, "all": 205_732
-    }  # fmt: skip
+    by_split = {row.name: row.ours[-1] for row in split.rows}
+    splits = {"ID train": 113_642, "ID test": 28_452, "OOD train": 12_712, "OOD test": 50_926, "all": 205_732}
+    assert by_split == splits
+    shares = {row.name: (row.ours[0], row.theirs[0]) for row in share.rows}
+    assert len(shares) == 12
+    # The paper prints two digits; a release of its counts has its shares to half of the last one.
+    for name, (ours, paper) in shares.items():
+        assert ours == pytest.approx(paper, abs=0.0051), name
+    assert shares["malls"][1] == 28.82
+    lengths = {row.name: row.ours[0] for row in length.rows}
+    # Table 2: 2,607.253 km of 125,064 instances, two a route.
+    assert lengths["Urban"] == pytest.approx(2_607_253 / 62_532)
+    assert list(lengths) == ["Urban", "Natural", "Infrastructure", "Disaster", "all"]
+    urban = {column.name: ours for column, ours in zip(families.columns, families.rows[0].ours, strict=True)}
+    assert (urban["types"], urban["scenes"], urban["anchors"]) == (9, 18, 1030)
+    some = tables([m for m in papers if m.scene != "U_Mall_0"])[1]
+    assert (some.rows[0].theirs[0], some.rows[1].theirs[0]) == (None, 6)
 
 
 def test_what_is_not_the_papers_is_shown_with_the_papers_below(papers):
@@ -89,24 +98,6 @@ def test_what_is_not_the_papers_is_shown_with_the_papers_below(papers):
     assert lines[4].rfind("442") == lines[3].rfind(f"{wrong.instances}")
     assert lines[-1] == "6 of 12 counts are not the paper's."
     assert "| 13 (paper: 14) |" in as_markdown([table])
-
-
-def test_shares_lengths_types_and_anchors_are_those_of_the_paper(papers):
-    shares = {row.name: (row.ours[0], row.theirs[0]) for row in tables(papers)[4].rows}
-    assert len(shares) == 12
-    # The paper prints two digits; a release of its counts has its shares to half of the last one.
-    for name, (ours, paper) in shares.items():
-        assert ours == pytest.approx(paper, abs=0.0051), name
-    assert shares["malls"][1] == 28.82
-    lengths = {row.name: row.ours[0] for row in tables(papers)[5].rows}
-    # Table 2: 2,607.253 km of 125,064 instances, two a route.
-    assert lengths["Urban"] == pytest.approx(2_607_253 / 62_532)
-    assert list(lengths) == ["Urban", "Natural", "Infrastructure", "Disaster", "all"]
-    table = tables(papers)[1]
-    urban = {column.name: ours for column, ours in zip(table.columns, table.rows[0].ours, strict=True)}
-    assert (urban["types"], urban["scenes"], urban["anchors"]) == (9, 18, 1030)
-    some = tables([m for m in papers if m.scene != "U_Mall_0"])[1]
-    assert (some.rows[0].theirs[0], some.rows[1].theirs[0]) == (None, 6)
 
 
 def test_the_release_stands_below_the_benchmarks_of_table_1(papers):
@@ -122,7 +113,7 @@ def test_the_release_stands_below_the_benchmarks_of_table_1(papers):
     assert len(table.records()) == 8 * 8
 
 
-def test_csv_has_every_figure_once_and_to_the_last_digit(papers):
+def test_csv_has_every_figure_once_and_to_the_last_digit_and_markdown_is_regular(papers):
     made = tables(papers)
     records = list(csv.DictReader(io.StringIO(as_csv(made))))
     assert len(records) == sum(len(t.rows) * len(t.columns) for t in made)
@@ -132,10 +123,7 @@ def test_csv_has_every_figure_once_and_to_the_last_digit(papers):
     for name, paper in inventory().items():
         assert int(ours["Scenes", name, "instances"]) == 2 * sum(paper.tasks.values())
         assert float(ours["Scenes", name, "km"]) == paper.path_m / 1000
-
-
-def test_markdown_tables_are_regular(papers):
-    for block in as_markdown(tables(papers)).split("### ")[1:]:
+    for block in as_markdown(made).split("### ")[1:]:
         assert len({line.count("|") for line in block.splitlines() if line.startswith("|")}) == 1
 
 
@@ -240,16 +228,12 @@ def test_tables_of_goals_and_difficulty_fit_a_terminal_where_a_release_tells_of_
     assert len(difficulty_tables(tasks.assign(target_split=""))) == 2
 
 
-def stats(*arguments):
-    return called("stats", *arguments)
-
-
 @pytest.fixture(scope="module")
 def drawn(smoke, tmp_path_factory):
     """The figures of the small release, by way of the command, and what it printed."""
     out = tmp_path_factory.mktemp("figures")
     files = ["--figures", out / "drawn", "--markdown", out / "stats.md", "--csv", out / "stats.csv"]
-    done = stats("--data", smoke, *files)
+    done = called("stats", "--data", smoke, *files)
     assert done.returncode == 0, done.stderr
     return out, done.stdout
 
@@ -289,16 +273,13 @@ def test_figures_are_pictures_without_a_date_and_the_same_again(smoke, drawn, tm
         assert path.read_bytes() == (drawn[0] / "drawn" / path.name).read_bytes()
 
 
-def test_bars_are_as_long_as_the_counts(smoke):
+def test_bars_are_as_long_as_the_counts_and_words_ranked_from_the_top_down(smoke):
     names = check_release(smoke)
     axes = composition(read_tasks(smoke, names)).axes[0]
     instances = sum(made_of(smoke, name).instances for name in names)
     assert sum(bar.get_width() for bar in axes.patches) == instances
     assert {t.get_text() for t in axes.texts} == {f"{instances:,}"}
     assert len(SETTING_COLOURS) == len(set(SETTING_COLOURS.values())) == len(axes.containers)
-
-
-def test_a_ranking_has_the_most_frequent_words_from_the_top_down():
     counts = {f"w{k}": Counter({"Urban": k, "Natural": 2}) for k in range(1, 72)}
     figure = _ranking(counts, "tasks", "names")
     drawn = [(label.get_text(), bar.get_width()) for axes in figure.axes
@@ -313,11 +294,30 @@ def test_scale_bars_are_round(most, length):
     assert _round_length(most) == pytest.approx(length)
 
 
-def test_a_part_of_the_scenes_is_chosen_by_name_or_glob(smoke):
-    done = stats("--data", smoke, "--scene", "*_1")
-    assert done.returncode == 0, done.stderr
-    assert "U_Courtyard_1" in done.stdout
-    assert "U_Courtyard_0" not in done.stdout
-    done = stats("--data", smoke, "--scene", "U_Courtyard_2")
-    assert done.returncode == 2
-    assert done.stderr == "error: no scene 'U_Courtyard_2': did you mean 'U_Courtyard_1' or 'U_Courtyard_0'?\n"
+TEXTS = ("A red van stands by the hut.", "A red van stands by the gate.", "Look for the blue tent. It has a door.")
+
+
+def test_counts():
+    found = measure(TEXTS, [1, 2, 3], ["x", "x", "y"])
+    assert (found["texts"], found["words"], found["vocabulary"]) == ("3", "23", "15")
+    assert found["fewest, median, most words"] == "7, 7, 9"
+    assert (found["frames"], found["most common frame"]) == ("2", "66.67%")
+    assert found["first four words shared"] == "66.7%"
+    # Two texts of one object may begin alike.
+    assert measure(TEXTS, [1, 1, 3], "xyz")["first four words shared"] == "0.0%"
+    share = (4 + 1 + 6) / (4 + 4 + 6)
+    assert found["distinct 1-, 2-, 3- and 4-grams"].endswith(f", {share:.3f}")
+
+
+def test_self_bleu_is_one_of_copies_and_little_of_strangers():
+    copies, strangers = [words_of(TEXTS[0])] * 3, [words_of(text) for text in ("a b c d e", "f g h i j")]
+    assert self_bleu(copies, [1, 2, 3]) == pytest.approx(1.0)
+    assert self_bleu(strangers, [1, 2]) < 0.2
+
+
+@pytest.mark.pipeline
+def test_a_release_is_measured_by_level(smoke):
+    found = read_variety(smoke, ["U_Courtyard_0", "U_Courtyard_1"])
+    assert set(found) == {"all", "one an object", "terse", "normal", "detailed", "vague"}
+    assert int(found["all"]["texts"]) > int(found["one an object"]["texts"]) > 0
+    assert "self-BLEU-4" in "\n".join(variety_table(found).markdown())

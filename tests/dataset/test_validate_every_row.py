@@ -9,14 +9,17 @@ import math
 import numpy as np
 import pyarrow as pa
 import pytest
-from support.planting import add, definitions, put
+from support.layout_checks import drawn
+from support.planting import add, check, check_of, definitions, named, put
 
+from aerialdojo_gen.dataset.contents import SHARDS
 from aerialdojo_gen.dataset.validate.parts import read_tables, release_of
 from aerialdojo_gen.dataset.validate.registry import run_checks
 from aerialdojo_gen.dataset.validate.rows import SceneData
 from aerialdojo_gen.dataset.validate.run import SCENE_CHECKS
 from aerialdojo_gen.geometry.surface import Surface
 from aerialdojo_gen.scenes.glb import read_glb
+from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.schemas import APPROACH, STOP
 
 SCENE = "U_Courtyard_0"
@@ -113,23 +116,26 @@ def test_the_flight_volume_ends_at_each_of_its_six_sides(data, axis, place):
         assert found == []
 
 
-@pytest.mark.parametrize(("degrees", "off"), [(-7.6, True), (-7.4, False), (7.4, False), (7.6, True), (179, True)])
-def test_the_last_yaw_may_be_half_a_turn_of_15_degrees_off(data, degrees, off):
-    def change(row):
-        row["yaw_rad"][-1] = row["goal_yaw_rad"] + math.radians(degrees)
-
-    planted, found = judged(data, "final_yaw", "routes", change)
-    assert found == (planted if off else [])
+def ending_turned(degrees):
+    return lambda row: put("yaw_rad", row["goal_yaw_rad"] + math.radians(degrees), 1)(row)
 
 
-@pytest.mark.parametrize(("metres", "far"), [(1.001, True), (0.999, False)])
-def test_an_approach_may_be_a_metre_long(data, metres, far):
-    def change(row):
-        for name in PLACES:
-            row[name][-2] = row[f"goal_{name}"] + metres / math.sqrt(3)
+def approaching_from(metres):
+    return lambda row: [row[name].__setitem__(-2, row[f"goal_{name}"] + metres / math.sqrt(3)) for name in PLACES]
 
-    planted, found = judged(data, "stops_far", "routes", change, approaches)
-    assert found == (planted if far else [])
+
+# The last yaw may be half a turn of 15 degrees off, and an Approach a metre long.
+EDGES = [
+    *(("final_yaw", ending_turned(off), lambda _: True, abs(off) > 7.5) for off in (-7.6, -7.4, 7.4, 7.6, 179)),
+    *(("stops_far", approaching_from(metres), approaches, metres > 1.0) for metres in (1.001, 0.999)),
+]
+
+
+@pytest.mark.parametrize("edge", EDGES, ids=lambda edge: f"{edge[0]}-{EDGES.index(edge)}")
+def test_what_is_just_beyond_a_limit_is_found_and_what_is_just_within_it_is_not(data, edge):
+    name, change, wanted, beyond = edge
+    planted, found = judged(data, name, "routes", change, wanted)
+    assert found == (planted if beyond else [])
 
 
 @pytest.mark.parametrize("metres", [-0.1, 0.1])
@@ -171,3 +177,70 @@ def test_rows_out_of_order_are_found_in_every_part(data):
         one = next(one for one in SCENE_CHECKS if one.name == "unsorted_rows")
         (outcome,) = (o for o in run_checks(here, [one]) if o.table == "routes")
         assert [(fault.part, fault.key) for fault in outcome.faults] == [(rows.parts[part], swapped.key(end - 1))]
+
+
+# Every fourth pixel is looked at: a box that is off by one is within what that can tell.
+# Of the points of a target one or two may be seen or not: rays along an edge.
+UNTOLD = {"box_u0_px", "box_v0_px", "box_u1_px", "box_v1_px", "target_visible_at_start"}
+# What others say or refer to is told at them.
+TOLD_ELSEWHERE = {
+    "landmark_id": "unknown_landmark", "selected": "selected_anchor", "description": "task_text", "name": "task_goal",
+    "paraphrases": "task_text", "reference_image_id": "task_goal", "shape_held_out": "task_goal",
+}  # fmt: skip
+
+
+def other(value, kind):
+    """Another value of a column's type, near the first where that is hardest to see."""
+    if pa.types.is_list(kind):
+        return [value[0], other(value[1], kind.value_type), *value[2:]]
+    if isinstance(value, dict):
+        return value | {"text": value["text"][:-3] + "xyz"}
+    if value is None:
+        return "x" if pa.types.is_string(kind) else b"x" if pa.types.is_binary(kind) else 1
+    if isinstance(value, bool):
+        return not value
+    if isinstance(value, float):
+        return value + 0.05
+    if isinstance(value, int):
+        return value + 1 if value < 100 else value - 1
+    return value[:-3] + (b"xyz" if isinstance(value, bytes) else "x")
+
+
+@pytest.mark.parametrize("key", drawn([key for key in SHARDS if not key.endswith("/test")], 2))
+def test_every_cell_is_held_to_something(planted, key):
+    spec = store.LAYOUT[key].spec
+    columns = [field for field in spec.schema if field.name not in UNTOLD]
+    clean = planted.rows(key)
+    tables = {"*", spec.name, *(("objects", "tasks") if TOLD_ELSEWHERE.keys() & set(spec.schema.names) else ())}
+    while columns:
+        rows = [dict(row) for row in clean]
+        # A row a column, as many as there are rows, so that each fault stands in a row of its own.
+        now, columns = columns[: len(rows)], columns[len(rows) :]
+        wanted = {}
+        for row, field in zip(rows, now, strict=False):
+            before = dict(row)
+            row[field.name] = other(row[field.name], field.type)
+            wanted[field.name] = {named(key, r) for r in (before, row)}
+        planted.write(key, rows)
+        found = check_of(planted, *tables)
+        told = {row for rows in found.values() for row in rows}
+        untold = {name for name, keys in wanted.items() if not keys & told}
+        assert untold <= {name for name, by in TOLD_ELSEWHERE.items() if by in found}
+
+
+@pytest.mark.parametrize("value", drawn([None, math.nan, -1, 2**31 - 1, 1e300, ""], 1))
+def test_no_value_is_too_strange_to_be_judged(planted, value):
+    for key in SHARDS:
+        rows = planted.rows(key)
+        for field in store.LAYOUT[key].spec.schema:
+            kind = field.type.value_type if pa.types.is_list(field.type) else field.type
+            if pa.types.is_struct(kind):
+                continue  # its fields are not nullable
+            try:
+                strange = pa.scalar(value, kind).as_py()
+            except (pa.ArrowInvalid, pa.ArrowTypeError, OverflowError):
+                continue
+            for row in rows[::2]:
+                row[field.name] = [strange] * 3 if pa.types.is_list(field.type) and value is not None else strange
+        planted.write(key, rows, sort=False)
+    assert check(planted, sample=5)

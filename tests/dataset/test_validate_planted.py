@@ -56,7 +56,8 @@ def patched(picture):
 def test_pictures_swapped_or_copied(planted, renderer):
     """By the renderer that drew them, and by another one; of four pictures, one is its own."""
     rows = planted.rows(OBJECTS)
-    four = scene_data(planted, pictures=4).sampled_objects
+    data = scene_data(planted, pictures=4)
+    four = data.sampled(data["objects"])
     pictures = [rows[row]["reference_image"] for row in four]
     swapped = {0: 1, 1: 0, 2: 0}
     for mine, other in swapped.items():
@@ -101,9 +102,15 @@ def test_pictures_that_were_changed(planted, first):
         assert words in said
 
 
-def test_a_sample_of_pictures_is_drawn_anew(planted):
-    judged = [outcome_of(scene_data(planted, pictures=n), "image_redrawn").rows for n in (0, 2, None)]
-    assert judged == [0, 2, len(pictured(planted))]
+def test_a_sample_of_routes_or_pictures_is_of_so_many_and_always_the_same(planted):
+    routes = planted.rows("routes/train") + planted.rows("routes/test")
+    for table, option, every in (("routes", "sample", len(routes)), ("objects", "pictures", len(pictured(planted)))):
+        for most in (0, 2, None):
+            first, again = (scene_data(planted, **{option: most}) for _ in range(2))
+            drawn_rows = first.sampled(first[table]).tolist()
+            assert len(drawn_rows) == (every if most is None else most)
+            assert drawn_rows == again.sampled(again[table]).tolist()
+    assert outcome_of(scene_data(planted, pictures=2), "image_redrawn").rows == 2
 
 
 def swap_colours(document):

@@ -2,6 +2,9 @@
 
 import numpy as np
 import pytest
+import trimesh
+from support.flying import town
+from support.handmade import instance
 from support.planting import (
     PlantedFault,
     add,
@@ -17,11 +20,15 @@ from support.planting import (
     turned,
 )
 
-from aerialdojo_gen.dataset.validate import collisions, oracle
+from aerialdojo_gen.dataset.validate import flights
 from aerialdojo_gen.dataset.validate.detours import _pieces
+from aerialdojo_gen.dataset.validate.reachability import open_above, over_lattice, way_aside
 from aerialdojo_gen.dataset.validate.registry import ALWAYS_AFTER, TABLES
 from aerialdojo_gen.dataset.validate.run import SCENE_CHECKS
 from aerialdojo_gen.geometry.motion import replay
+from aerialdojo_gen.geometry.rays import RayCaster
+from aerialdojo_gen.planning.clearance import ClearanceGrid
+from aerialdojo_gen.scenes.model import Material, Scene
 from aerialdojo_gen.store.schemas import APPROACH, STOP, TURN_LEFT, TURN_RIGHT
 
 RADIUS = 0.25
@@ -191,7 +198,7 @@ def test_a_wall_across_any_one_leg_of_any_route_is_found(planted, world):
             joints[named(KEY, rows[k])] = joint
         planted.write(part, rows)
     data = scene_data(planted)
-    found = {data["routes"].key(f.row): f.found for f in collisions.route_collision(data, data["routes"])}
+    found = {data["routes"].key(f.row): f.found for f in flights.route_collision(data, data["routes"])}
     told = {name: [", ".join(f"{v:.2f}" for v in end) for end in joint] for name, joint in joints.items()}
     assert found == {name: f"the body touches a surface between ({p}) and ({q}) m" for name, (p, q) in told.items()}
 
@@ -228,9 +235,9 @@ def test_replayed_actions_are_swept_for_themselves(planted, world):
 
     row = planted.edit(KEY, change, hits)
     data = scene_data(planted)
-    found = [data["routes"].key(f.row) for f in collisions.replay_collision(data, data["routes"])]
+    found = [data["routes"].key(f.row) for f in flights.replay_collision(data, data["routes"])]
     assert found == [named(KEY, row)]
-    assert not list(collisions.route_collision(data, data["routes"]))
+    assert not list(flights.route_collision(data, data["routes"]))
 
 
 @pytest.mark.parametrize(
@@ -256,7 +263,7 @@ def test_the_oracle_says_what_a_flight_lacks(planted, world, key, change, words)
     nav_ids = {row["nav_id"] for row in planted.rows(KEY) if wanted(row)}
     row = planted.edit(key, change, wanted if key == KEY else first_instance)
     data = scene_data(planted)
-    found = {data["routes"].key(fault.row): fault.found for fault in oracle.oracle_fails(data, data["routes"])}
+    found = {data["routes"].key(fault.row): fault.found for fault in flights.oracle_fails(data, data["routes"])}
     assert list(found) == [f"nav_id={row['nav_id']}"]
     assert words in found[f"nav_id={row['nav_id']}"]
 
@@ -300,13 +307,6 @@ def test_pieces_are_the_shortest_that_are_worth_it(planted):
     assert _pieces(straight) == []
 
 
-def test_a_sample_asks_fcl_about_so_many_routes_and_always_the_same(planted):
-    asked = scene_data(planted, sample=5).sampled
-    assert len(asked) == 5
-    assert (asked == scene_data(planted, sample=5).sampled).all()
-    assert len(scene_data(planted).sampled) == len(planted.rows(KEY)) + len(planted.rows("routes/test"))
-
-
 def test_checks_stand_after_those_that_they_build_on():
     seen = {table: set() for table in TABLES}
     for one in SCENE_CHECKS:
@@ -315,3 +315,42 @@ def test_checks_stand_after_those_that_they_build_on():
             seen[table].add(one.name)
     assert all(set(ALWAYS_AFTER) <= names for names in seen.values())
     assert len({one.name for one in SCENE_CHECKS}) == len(SCENE_CHECKS)
+
+
+def hall(door: bool) -> Scene:
+    """A hall around a closet around a place; with doors on sides that face away from each other."""
+
+    def shell(half: float, side: int) -> trimesh.Trimesh:
+        body = trimesh.creation.box((2 * half, 2 * half, 6 + half)).apply_translation([0, 0, (6 + half) / 2])
+        body = body.subdivide().subdivide().subdivide()
+        middle = body.triangles_center
+        open_ = (middle[:, 0] * side > half - 1e-6) & (np.abs(middle[:, 1]) < half / 3) & (middle[:, 2] < 4)
+        body.update_faces(~(open_ if door else np.zeros(len(middle), dtype=bool)))
+        return body
+
+    ground = trimesh.creation.box(bounds=[[-30, -30, -1], [30, 30, 0]])
+    bodies = (("ground", ground), ("hall", shell(12, 1)), ("closet", shell(4, -1)))
+    return Scene(
+        "Hall_0", tuple(instance(n, b) for n, b in bodies), {"grey": Material("grey", (128, 128, 128))},
+        np.array([[-30.0, -30, 0], [30, 30, 25]]),
+    )  # fmt: skip
+
+
+def test_a_way_out_is_found_round_corners_and_none_through_walls():
+    places = np.array([[20.0, 20, 3], [8, 8, 3], [0, 0, 2]])
+    for door, expected in ((False, [True, False, False]), (True, [True, True, True])):
+        scene = hall(door)
+        rays = RayCaster(scene)
+        assert open_above(rays, places).tolist() == [True, False, False]
+        assert over_lattice(rays, scene.bounds, places).tolist() == expected
+        assert not way_aside(rays, places)[~np.array(expected)].any()
+
+
+def test_where_the_generator_has_a_way_rays_find_one():
+    scene = town()
+    grid, rays = ClearanceGrid.build(scene), RayCaster(scene)
+    p = np.random.default_rng(1).uniform(scene.bounds[0] + 0.3, scene.bounds[1] - 0.3, (1500, 3))
+    reachable = np.array([grid.reachable(x) for x in p])
+    assert reachable.sum() > 300
+    free = way_aside(rays, p[reachable])
+    assert over_lattice(rays, scene.bounds, p[reachable][~free]).all()

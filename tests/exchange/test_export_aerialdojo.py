@@ -18,7 +18,7 @@ from support.command_line import called
 from support.releases import copy_release, files_of, released, replace_rows
 
 from aerialdojo_gen.base.errors import AssetError, StoreError, UsageError
-from aerialdojo_gen.dataset.contents import existing_scenes, release_scenes
+from aerialdojo_gen.dataset.contents import existing_scenes, scenes_in_release
 from aerialdojo_gen.exchange import exporting
 from aerialdojo_gen.exchange.exporting import estimate_size, export_release
 from aerialdojo_gen.pipeline.progress import Reporter
@@ -182,7 +182,7 @@ def test_pictures_are_as_large_as_the_authors_and_show_the_same_view(layout, smo
 
 def test_the_size_is_announced_and_the_releases_own_pictures_are_exported_on_demand(smoke, plain):
     out, said = plain
-    size = estimate_size("aerialdojo", open_root(smoke), release_scenes(smoke), 0)
+    size = estimate_size("aerialdojo", open_root(smoke), scenes_in_release(smoke), 0)
     written = [path.stat() for path in out.rglob("*") if path.is_file()]
     assert size.files == len(written), "to the file"
     # Links to one file count once.
@@ -264,7 +264,7 @@ def test_archives_unpacked_are_the_files(plain, smoke, tmp_path):
     """Those of an export before, to the byte; the archives tell nothing of when and where they were made."""
     counts = export_release("aerialdojo", smoke, tmp_path / "tars", shards=True, picture_px=0)
     archives = sorted((tmp_path / "tars").glob("*.tar"))
-    assert [path.stem for path in archives] == release_scenes(smoke)
+    assert [path.stem for path in archives] == scenes_in_release(smoke)
     assert {path.name for path in (tmp_path / "tars").iterdir()} == {*(p.name for p in archives), "export.json"}
     for path in archives:
         with tarfile.open(path) as tar:

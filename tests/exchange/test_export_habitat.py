@@ -14,7 +14,7 @@ import trimesh
 from scipy.spatial.transform import Rotation
 from support.releases import files_of, released
 
-from aerialdojo_gen.dataset.contents import release_scenes
+from aerialdojo_gen.dataset.contents import scenes_in_release
 from aerialdojo_gen.exchange.exporting import estimate_size, export_release
 from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.store.root import open_root
@@ -137,7 +137,7 @@ def test_goals_are_all_objects_seen_from_their_anchors(habitat, smoke):
 
 
 def test_the_size_is_announced_and_the_same_release_gives_the_same_bytes(habitat, smoke, tmp_path):
-    size, said = estimate_size("habitat", open_root(smoke), release_scenes(smoke), 0), io.StringIO()
+    size, said = estimate_size("habitat", open_root(smoke), scenes_in_release(smoke), 0), io.StringIO()
     export_release("habitat", smoke, tmp_path / "again", reporter=Reporter(stream=said))
     files = files_of(tmp_path / "again")
     assert files == files_of(habitat)

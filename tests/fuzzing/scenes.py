@@ -15,10 +15,8 @@ from fuzzing.mutate import toml_dumped
 from fuzzing.plans import PLANS
 from support import annotation_scenes
 
-from aerialdojo_gen.annotations.check import check_source
+from aerialdojo_gen.annotations.check import SourceCheck
 from aerialdojo_gen.annotations.format import format_annotations, parse_annotations
-from aerialdojo_gen.annotations.relations import SceneGeometry
-from aerialdojo_gen.annotations.vocabulary import Vocabulary
 from aerialdojo_gen.base.config.pipeline import load_pipeline
 from aerialdojo_gen.base.errors import AerialDojoError
 from aerialdojo_gen.pipeline.stages.work.annotate_import import annotation_tables
@@ -36,16 +34,13 @@ def _annotations() -> list[Case]:
     return [{"U_Street_0.json": plain.encode()}, {"U_Street_0.json": json.dumps(anchored).encode()}]
 
 
-@cache
-def _street() -> tuple[Vocabulary, SceneGeometry]:
-    vocabulary = annotation_scenes.street_vocabulary()
-    return vocabulary, SceneGeometry(vocabulary.scene)
+_street = cache(annotation_scenes.street_vocabulary)
 
 
 def _read_annotations(folder: Path) -> None:
     path = folder / "U_Street_0.json"
     raw = path.read_bytes()
-    vocabulary, geometry = _street()
+    vocabulary = _street()
     try:
         annotations = parse_whole(raw, "U_Street_0", str(path))
     except AerialDojoError:
@@ -56,7 +51,7 @@ def _read_annotations(folder: Path) -> None:
         raise
     source = parse_annotations(format_annotations(annotations).encode().decode())
     assert source.annotations == annotations
-    checked = check_source(source, vocabulary, None, geometry)
+    checked = SourceCheck(source, vocabulary)
     utterable(map(str, checked.faults))
     if not checked.faults:
         annotation_tables(annotations, checked.claims)

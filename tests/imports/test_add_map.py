@@ -13,7 +13,7 @@ from shapely.geometry import Point, Polygon
 from support import maps
 from support.layout_checks import ASSETS, catalogue
 
-from aerialdojo_gen.annotations.landmarks import choose_landmarks
+from aerialdojo_gen.annotations.draft import choose_landmarks
 from aerialdojo_gen.annotations.vocabulary import Vocabulary
 from aerialdojo_gen.base.errors import AssetError, MissingPackage, UsageError
 from aerialdojo_gen.imports import map_buildings, map_ground

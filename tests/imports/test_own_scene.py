@@ -14,8 +14,7 @@ from support import foreign
 from support.command_line import said
 from support.layout_checks import catalogue
 
-from aerialdojo_gen.annotations.draft import AnnotationDrafter, DraftOptions
-from aerialdojo_gen.annotations.landmarks import choose_landmarks
+from aerialdojo_gen.annotations.draft import AnnotationDrafter, DraftOptions, choose_landmarks
 from aerialdojo_gen.annotations.phrases import group_of
 from aerialdojo_gen.annotations.vocabulary import Vocabulary
 from aerialdojo_gen.imports.forms import form_of, grown, is_unnamed

@@ -13,7 +13,7 @@ from support.foreign import raw, read_here
 from support.handmade import box
 from support.interchange import collada, fbx
 
-from aerialdojo_gen.annotations.appearance import colour_shares, unsupported_colours
+from aerialdojo_gen.annotations.vocabulary import colour_shares, unsupported_colours
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.base.pictures import image_size
 from aerialdojo_gen.geometry.cameras import Camera, look_at_pose

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from support.annotation_scenes import street, street_annotations, street_vocabulary
 
-from aerialdojo_gen.annotations.check import check_source
+from aerialdojo_gen.annotations.check import SourceCheck
 from aerialdojo_gen.annotations.format import Anchor, Landmark, format_annotations, parse_annotations
 from aerialdojo_gen.base.config.sections import AnnotateImportConfig
 from aerialdojo_gen.base.config.shared import Embodiment
@@ -36,7 +36,7 @@ def _job(tmp_path, text):
 
 
 def _faults(annotations, scene=None, counts=None):
-    return check_source(parse_annotations(format_annotations(annotations)), street_vocabulary(scene), counts).faults
+    return SourceCheck(parse_annotations(format_annotations(annotations)), street_vocabulary(scene), counts).faults
 
 
 def _changed(k, **changes):

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from aerialdojo_gen.annotations.claims import Claim, SceneClaims
+from aerialdojo_gen.annotations.claims import SceneClaims, claims_from_json
 from aerialdojo_gen.annotations.format import Landmark
 from aerialdojo_gen.annotations.language.sides import WRITTEN, of_side
 from aerialdojo_gen.annotations.language.writer import Writer
@@ -37,7 +37,7 @@ def test_parts_that_no_picture_shows_are_not_said(smoke, claims):
     parts = 0
     for item in rows_of(smoke, "objects"):
         i = claims.geometry.index[item["mesh_node"]]
-        own = [Claim.from_json(raw) for raw in json.loads(item["claims"])]
+        own = claims_from_json(item["claims"])
         # Of the others, such as "longer than a car", the whole is the part.
         named = {look.phrase for look in claims.vocabulary.appearances_of(claims.scene.instances[i]) if look.parts}
         for text in writer.texts(i, own, set(), 5):

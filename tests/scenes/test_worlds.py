@@ -15,11 +15,11 @@ from hypothesis import strategies as st
 from support.layout_checks import ASSETS, catalogue, drawn
 
 import aerialdojo_gen.scenes.worlds
-from aerialdojo_gen.annotations.appearance import SHADES
 from aerialdojo_gen.annotations.phrases import phrases_of_value
+from aerialdojo_gen.annotations.vocabulary import SHADES
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.base.rng import generator
-from aerialdojo_gen.dataset.validate.contact import _Air
+from aerialdojo_gen.dataset.validate.meshes import _Air
 from aerialdojo_gen.scenes.checks import faults
 from aerialdojo_gen.scenes.colours import colour_name
 from aerialdojo_gen.scenes.light import sun_at

@@ -15,8 +15,9 @@ import pyarrow.parquet as pq
 from support.foreign import changed_glb
 
 from aerialdojo_gen.base.config.pipeline import load_pipeline
+from aerialdojo_gen.dataset.contents import part_name
 from aerialdojo_gen.dataset.validate import ValidationOptions, validate
-from aerialdojo_gen.dataset.validate.parts import part_path, read_tables, release_of
+from aerialdojo_gen.dataset.validate.parts import read_tables, release_of
 from aerialdojo_gen.dataset.validate.registry import Outcome, run_checks
 from aerialdojo_gen.dataset.validate.report import Report
 from aerialdojo_gen.dataset.validate.rows import SceneData
@@ -40,7 +41,7 @@ class Planted:
         self.data, self.scene, self.release = data, scene, data / "release"
 
     def path(self, key: str) -> Path:
-        return self.release / part_path(key, self.scene)
+        return self.release / part_name(key, self.scene, "")
 
     def rows(self, key: str) -> list[Row]:
         return pq.read_table(self.path(key), partitioning=None).to_pylist()

@@ -10,7 +10,7 @@ import numpy as np
 
 from aerialdojo_gen.annotations.claims import Claim, SceneClaims
 from aerialdojo_gen.annotations.language.locations import WHERE
-from aerialdojo_gen.annotations.language.subject import Wording, wordings_of
+from aerialdojo_gen.annotations.language.nouns import Wording, wordings_of
 from aerialdojo_gen.annotations.relations import DISTRACTOR_SLACK
 from aerialdojo_gen.base.rng import pick
 from aerialdojo_gen.scenes.appearances import Appearance
@@ -58,7 +58,7 @@ class About:
         said = [
             w for w in wordings_of(claims, appearances, self.instance.category)
             if w.adjectives or w.tails or w.details
-            if w.key != "part" or _is_visible(appearances, claims[w.index].key, shown)
+            if w.key != "part" or shown is None or _is_visible(appearances.get(claims[w.index].key), shown)
         ]  # fmt: skip
         self.wordings = {wording.index: wording for wording in said}
         self.adjectives = [w for w in said if w.key != "part" and (w.adjectives or w.tails)]
@@ -66,7 +66,6 @@ class About:
         self.places = [k for k, claim in enumerate(claims) if claim.kind in WHERE]
         same = self.instance.category
         self._others = [j for j, it in enumerate(scene.scene.instances) if it.category == same and j != i]
-        self.is_unique = cache(self._is_unique)
         self._fits = cache(lambda index, j: scene.holds(claims[index], j, DISTRACTOR_SLACK))
 
     def distractors(self, indices: Collection[int]) -> list[int]:
@@ -77,7 +76,7 @@ class About:
         """Those of some things that a claim fits as well."""
         return [j for j in things if self._fits(index, j)]
 
-    def _is_unique(self, index: int) -> bool:
+    def is_unique(self, index: int) -> bool:
         """Whether a claim is false of every other of the category in the scene, and there are others."""
         return bool(self._others) and not self.fitting(index, self._others)
 
@@ -105,9 +104,8 @@ def _named(claim: Claim) -> frozenset[str]:
     return frozenset(word.removesuffix("s") for word in words if len(word) > 2)
 
 
-def _is_visible(appearances: Mapping[str, Appearance], key: str, shown: Collection[str] | None) -> bool:
-    appearance = appearances.get(key)
-    return appearance is None or shown is None or all(set(part.split("|")) & set(shown) for part in appearance.parts)
+def _is_visible(appearance: Appearance | None, shown: Collection[str]) -> bool:
+    return appearance is None or all(set(part.split("|")) & set(shown) for part in appearance.parts)
 
 
 def choose(about: About, level: str, used: Collection[int], rng: np.random.Generator) -> Plan | None:

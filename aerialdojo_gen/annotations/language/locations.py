@@ -6,12 +6,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from aerialdojo_gen.annotations.claims import Claim, Mention, SceneClaims
-from aerialdojo_gen.annotations.language.grammar import FOLDER
 from aerialdojo_gen.annotations.language.nouns import Names, noun_phrase
 from aerialdojo_gen.annotations.phrases import group_of
 from aerialdojo_gen.base.constants import DIRECTIONS
@@ -21,7 +21,6 @@ from aerialdojo_gen.base.rng import pick
 from aerialdojo_gen.base.safe_parse import read_toml
 
 WHERE = frozenset({"place", "relation", "direction"})
-_SHORT = 5
 _LEVEL_M = 1.0
 STRUCTURE = "structure"  # the kind of what is not in the catalogue
 
@@ -56,7 +55,7 @@ _HOLDS: Mapping[str, Callable[[SceneClaims, int, int, Any], bool]] = {
 @cache
 def relation_phrases() -> Mapping[str, Mapping[str, tuple[RelationPhrase, ...]]]:
     """Read the wordings, by table and the claim's key."""
-    path = FOLDER / "relations.toml"
+    path = Path(__file__).with_name("relations.toml")
     tables = read_toml(path, AnnotationError)
     return {
         name: {
@@ -90,11 +89,6 @@ class Location:
     unique: bool = False  # Whether the scene has one such thing
     lead: int = 0  # Words before the thing
 
-    @property
-    def short(self) -> bool:
-        """Whether another phrase may follow without a comma."""
-        return len(self.text.split()) <= _SHORT
-
 
 class LocationPhrases:
     """Words for the claims of place in one scene."""
@@ -106,8 +100,9 @@ class LocationPhrases:
     def of(self, i: int, index: int, claim: Claim, level: str, rng: np.random.Generator) -> Location:
         """Word a claim of instance `i`, for a text of a level."""
         if claim.kind == "place":
-            text = pick(self._place(claim.key), rng)
-            return Location(index, "place", claim.key, text)
+            places = self._claims.places
+            said = (claim.key,) if places is None else places.wordings.get(claim.key.lower(), (claim.key,))
+            return Location(index, "place", claim.key, pick(said, rng))
         things = [self._thing(i, mention, rng) for mention in claim.things]
         direction = claim.key.removesuffix(" of")
         key = "direction" if claim.kind == "direction" else "side" if direction in DIRECTIONS else claim.key
@@ -131,10 +126,6 @@ class LocationPhrases:
             if all(words[k].holds(self._claims, i, j) for j in nodes):
                 return words[k].say
         return ""
-
-    def _place(self, phrase: str) -> Sequence[str]:
-        places = self._claims.places
-        return places.wordings(phrase.lower()) if places is not None and phrase.lower() in places else (phrase,)
 
     def _thing(self, i: int, mention: Mention, rng: np.random.Generator) -> str:
         if mention.node in self._landmarks:

@@ -1,7 +1,11 @@
-"""Noun phrases: synonyms that a scene leaves unambiguous, collectives, the order of adjectives, articles."""
+"""Noun phrases, and which adjectives and details an object's claims give.
+
+Synonyms that a scene leaves unambiguous, collectives, the order of adjectives, articles.
+"""
 
 from __future__ import annotations
 
+import re
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -9,11 +13,16 @@ from functools import cache, cached_property
 
 import numpy as np
 
-from aerialdojo_gen.annotations.phrases import CategoryWords, article, group_of
-from aerialdojo_gen.annotations.words import LISTS
+from aerialdojo_gen.annotations.claims import Claim
+from aerialdojo_gen.annotations.phrases import LISTS, CategoryWords, group_of, phrases_of_value, with_article
 from aerialdojo_gen.base.rng import pick
+from aerialdojo_gen.scenes.appearances import Appearance
+from aerialdojo_gen.scenes.colours import COLOURS
 
 _USUAL = 0.35  # How often the catalogue's own name is used where there are others
+# Small words, which may be said again; so may colours.
+_SMALL = re.compile(r"an?|the|and|or|of|on|in|at|to|by|for|from|with|without|over|under|its?|them|no|up|out|off")
+_ORDER = ("size", "state", "pattern", "shape", "colour", "material")
 
 
 @dataclass(frozen=True)
@@ -27,9 +36,7 @@ class Name:
     @property
     def text(self) -> str:
         """The noun in full: "row of wheelie bins"."""
-        return " ".join(
-            [*([self.lead] if self.lead else []), *([f"{self.group} of"] if self.group else []), self.head]
-        )
+        return " ".join(filter(None, (self.lead, self.group and f"{self.group} of", self.head)))
 
 
 @dataclass(frozen=True)
@@ -46,12 +53,12 @@ class NounPhrase:
         """Without article."""
         own = " ".join([*self.own, self.name.head])
         middle = f"{self.name.group} of {own}" if self.name.group else own
-        return " ".join(part for part in (self.name.lead, *self.whole, middle, self.tail) if part)
+        return " ".join(filter(None, (self.name.lead, *self.whole, middle, self.tail)))
 
     @property
     def a(self) -> str:
         """With the indefinite article."""
-        return f"{article(self.bare)} {self.bare}"
+        return with_article(self.bare)
 
     @property
     def the(self) -> str:
@@ -120,3 +127,69 @@ def _grouped(words: CategoryWords, noun: str) -> Name:
     if name.group or not words.group or not (group_of(noun) or group_of(words.name)):
         return name
     return Name(noun, words.group.removeprefix("a ").removeprefix("an ").removesuffix(" of"))
+
+
+@dataclass(frozen=True)
+class Wording:
+    """A claim about an object's appearance, and the ways to say it."""
+
+    index: int  # Of the claim
+    key: str  # The attribute's, or "part"
+    adjectives: tuple[str, ...] = ()
+    tails: tuple[str, ...] = ()  # After the noun: "full of soil"
+    details: tuple[str, ...] = ()  # After "with" or "it has"
+    clauses: tuple[str, ...] = ()  # "it lies on its roof"
+
+
+def wordings_of(claims: Sequence[Claim], appearances: Mapping[str, Appearance], category: str) -> list[Wording]:
+    """Word the claims about the appearance of an instance of a category."""
+    found = []
+    for index, claim in enumerate(claims):
+        if claim.kind == "part":
+            own = appearances.get(claim.key)
+            said = (own.details, own.adjectives, own.clauses) if own is not None else ((claim.key,), (), ())
+            found.append(Wording(index, "part", said[1], (), said[0], said[2]))
+        elif claim.kind in ("colour", "size", "attribute"):
+            key, _, value = claim.key.rpartition("=")
+            key = key or claim.kind
+            phrases = phrases_of_value(key, value, category)
+            details = tuple(p.removeprefix("with ") for p in phrases if p.startswith("with "))
+            # "Drums, one of them toppled, by the gate": no sentence here has room for that.
+            tails = tuple(p for p in phrases if not p.startswith(("+", "with ", "one ")))
+            found.append(Wording(index, key, tuple(p[1:] for p in phrases if p.startswith("+")), tails, details))
+    return found
+
+
+def phrase_of(name: Name, said: Sequence[Wording], rng: np.random.Generator) -> NounPhrase | None:
+    """Make the noun phrase that says these adjectives and tails, in English order; None if it says a word twice."""
+    known = set(name.text.split())
+    ordered = sorted(said, key=lambda w: _ORDER.index(w.key) if w.key in _ORDER else 1)
+    adjectives: list[str] = []
+    tail = ""
+    # One phrase fits after the noun: that of what has no adjective goes first.
+    for wording in sorted(ordered, key=lambda w: bool(w.adjectives)):
+        after = fresh(wording.tails, name.text) or (() if wording.adjectives else wording.tails)
+        options = [*wording.adjectives, *(() if tail else after)]
+        chosen = pick(options, rng) if options else ""
+        if chosen in wording.tails:
+            tail = chosen
+            continue
+        words = chosen.split()
+        # "Light wooden" before "wooden pallets".
+        adjectives.append(" ".join(words[:-1] if words and words[-1] in known else words))
+    # "Five round" says "round" as well.
+    kept = [a for a in adjectives if a and not any(set(a.split()) < set(b.split()) for b in adjectives)]
+    return None if _repeats_word(kept, name.text) else noun_phrase(name, kept, tail)
+
+
+def _repeats_word(adjectives: Sequence[str], noun: str) -> bool:
+    """Whether a word or a part of a compound is said twice: "striped blue-striped", "A-shaped A-board"."""
+    words = [*(word for text in adjectives for word in text.split()), *(w for w in noun.split() if "-" in w)]
+    parts = [part for word in words for part in word.split("-") if part != "and"]
+    return len(set(parts)) < len(parts)
+
+
+def fresh(phrases: Sequence[str], said: str) -> tuple[str, ...]:
+    """Return those of some phrases that say no word of a text again, small words and colours apart."""
+    known = {word.removesuffix("s") for word in said.split() if word not in COLOURS and not _SMALL.fullmatch(word)}
+    return tuple(phrase for phrase in phrases if not known & {word.removesuffix("s") for word in phrase.split()})

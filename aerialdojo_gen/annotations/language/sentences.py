@@ -1,19 +1,32 @@
-"""Choose sentences for what a text says, and fill them in."""
+"""Sentences: templates with alternatives, read from ``grammar.toml``, chosen for what a text says and filled in."""
 
 from __future__ import annotations
 
+import hashlib
+import itertools
 import re
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, cached_property
+from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
-from aerialdojo_gen.annotations.language.grammar import Frame, frames
 from aerialdojo_gen.annotations.language.locations import Location
-from aerialdojo_gen.annotations.language.nouns import NounPhrase
-from aerialdojo_gen.annotations.language.subject import Wording
+from aerialdojo_gen.annotations.language.nouns import NounPhrase, Wording
+from aerialdojo_gen.base.errors import AnnotationError
 from aerialdojo_gen.base.rng import pick
+from aerialdojo_gen.base.safe_parse import read_toml
+
+_T = TypeVar("_T")
+LEVELS = ("terse", "normal", "detailed", "vague")
+SLOTS = frozenset({"a", "the", "np", "be", "ing", "stands", "at", "ref", "byit", "nearit", "w", "clause"})
+# One in so many templates of first sentences of a kind is held out: those with the lowest hashes.
+_HELD_OUT_OF = 3
+_BY_OPENING = (0.9, 1.0, 0.22, 0.08, 0.04)  # by the words before the first slot
+_BARE = 0.4
+_SLOT = re.compile(r"\{(\w+)\}")
 
 _STARTS = re.compile(r"(^|[.?!] +)([a-zé])")
 _GOES_ON = re.compile(r"\{(?:a|the|np)\} (?:[a-z]|\{ing\})")
@@ -26,11 +39,83 @@ _OPENING = 2  # words that no other text of the object begins with
 _KINDS = {"at": 1.0, "ref": 0.5, "at_with": 1.0, "at_telling": 1.5}
 # "In front of the ..." begins a text more rarely than "by the ...": many would begin alike.
 _SHORT_LEAD, _RARELY = 2, 0.8
-_LONG = 8  # words of a place: what is longer ends its clause
+_SHORT, _LONG = 5, 8  # words of a place: what is short needs no comma, what is longer ends its clause
 _VERBS = frozenset({"be", "ing", "stands"})  # slots of a verb, which is not said twice
 _TURNED = 0.6  # how often a further place is said of the thing that it names
 _CLAUSE, _UNIQUE = 0.5, 0.6
 _SECOND_IN_FIRST = 0.6  # how often the first sentence says two places
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A template with its alternatives chosen: a sentence with slots."""
+
+    text: str
+    template: str
+    share: float  # Of the template's weight
+    held_out: bool  # Whether training tasks have no text with its template
+
+    @cached_property
+    def slots(self) -> frozenset[str]:
+        """Its slots."""
+        return frozenset(_SLOT.findall(self.text))
+
+
+@cache
+def frames(section: str, kind: str) -> tuple[Frame, ...]:
+    """List the frames of a section of the grammar (a level, or ``more``) and a kind (``at``, ``ref``, ...)."""
+    path = Path(__file__).with_name("grammar.toml")
+    templates = read_toml(path, AnnotationError)[section].get(kind, ())
+    by_hash = sorted(templates, key=_hash) if section != "more" else []
+    held = set(by_hash[: -(-len(by_hash) // _HELD_OUT_OF)])
+    found: list[Frame] = []
+    for template in templates:
+        texts = list(dict.fromkeys(" ".join(text.split()) for text in expand(template)))
+        unknown = {slot for text in texts for slot in _SLOT.findall(text)} - SLOTS
+        if unknown:
+            raise AnnotationError(f"{path}: {template!r}: no slot {{{sorted(unknown)[0]}}}")
+        # A template with more wordings is used more often, each of them less.
+        found += [Frame(text, template, _weight(text) * len(texts) ** -0.35, template in held) for text in texts]
+    return tuple(found)
+
+
+def _weight(text: str) -> float:
+    """Weigh a sentence: what begins with many words of its own would make texts begin alike."""
+    own = len(text.partition("{")[0].split())
+    # A label without a word of its own fits everywhere, and would be the most common.
+    bare = not _SLOT.sub("", text).strip(" ,:")
+    return _BARE if bare else _BY_OPENING[min(own, len(_BY_OPENING) - 1)]
+
+
+def expand(template: str) -> Iterator[str]:
+    """Yield the texts of a template, one for every choice of its alternatives."""
+    start = template.find("[")
+    if start < 0:
+        yield template
+        return
+    options, end = _options(template, start)
+    for option, rest in itertools.product(options, expand(template[end:])):
+        for inner in expand(option):
+            yield template[:start] + inner + rest
+
+
+def _options(template: str, start: int) -> tuple[list[str], int]:
+    """Split the alternatives of the bracket that opens at `start`; returns them and where it has closed."""
+    depth, options = 0, [""]
+    for at in range(start, len(template)):
+        sign = template[at]
+        depth += (sign == "[") - (sign == "]")
+        if depth == 0:
+            return options, at + 1
+        if depth == 1 and sign == "|":
+            options.append("")
+        elif at > start:
+            options[-1] += sign
+    raise AnnotationError(f"grammar: {template!r}: a bracket is not closed")
+
+
+def _hash(text: str) -> bytes:
+    return hashlib.blake2b(text.encode(), digest_size=8, person=b"held out").digest()
 
 
 @dataclass(frozen=True)
@@ -52,7 +137,11 @@ def compose(
     `used` are first words that it must not begin with.
     """
     if content.level in ("terse", "vague") and content.details:
-        return _with_tail(content, held_out, used, rng)
+        # The detail is said right after the noun.
+        if content.phrase.tail or " with " in content.phrase.bare or len(content.details) > 1:
+            return None
+        tail = f"with {pick(content.details[0][0].details, rng)}"
+        content = replace(content, phrase=replace(content.phrase, tail=tail), details=())
     places, details = list(content.places), list(content.details)
     section = "normal" if content.level == "detailed" else content.level
     kinds = {"at": _KINDS["at"]}
@@ -60,14 +149,18 @@ def compose(
         kinds["ref"] = _KINDS["ref"]
     if details and section == "normal":
         kinds |= {kind: _KINDS[kind] for kind in ("at_telling" if details[0][1] else "at_with",)}
-    names, weights = list(kinds), np.array(list(kinds.values()))
-    kind = names[int(rng.choice(len(names), p=weights / weights.sum()))]
+    kind = _drawn(list(kinds), list(kinds.values()), rng)
     # Nothing is "with ..." twice, and no tail stands: "a planter with flowers standing by ...".
     tailed = bool(content.phrase.tail) or " with " in content.phrase.bare
-    first = _choose(_fitting(section, kind, held_out, bool(content.verb[1]), tailed), rng)
-    if first is None:
+    pool = _fitting(section, kind, held_out, bool(content.verb[1]), tailed)
+    if not pool:
         return None
-    slots = _slots(content, rng)
+    first = _drawn(pool, [frame.share for frame in pool], rng)
+    verb, participle = content.verb
+    slots = {
+        "a": content.phrase.a, "the": content.phrase.the, "np": content.phrase.bare,
+        "be": verb, "ing": participle, "stands": "is" if " " in verb else verb,
+    }  # fmt: skip
     own = places[:1]
     if kind == "ref":
         slots |= {"ref": own[0].thing, "byit": own[0].pronoun}
@@ -85,37 +178,14 @@ def compose(
     for wording, unique in details:
         said.append(_detail(wording, unique, said, rng))
     for place in places[len(own) :]:
-        said.append(_place(place, "" if first.slots & _VERBS else content.verb[0], said, rng))
-    text = " ".join(_ended(frame.text.format(**slots)) for frame, slots in said)
+        said.append(_place(place, "" if first.slots & _VERBS else verb, said, rng))
+    sentences = [frame.text.format(**slots) for frame, slots in said]
+    text = " ".join(one if one[-1] in ".?!" else f"{one}." for one in sentences)
     text = _STARTS.sub(lambda m: m[1] + m[2].upper(), " ".join(text.split()))
     text = text.removesuffix(".") if content.level == "terse" else text
     if " ".join(text.split()[:_OPENING]) in used or _AWKWARD.search(text):
         return None
     return text, " | ".join(frame.text for frame, _ in said), first.held_out
-
-
-def _with_tail(
-    content: Content, held_out: bool, used: Collection[str], rng: np.random.Generator
-) -> tuple[str, str, bool] | None:
-    """Say the detail right after the noun."""
-    phrase = content.phrase
-    if phrase.tail or " with " in phrase.bare or len(content.details) > 1:
-        return None
-    detail = pick(content.details[0][0].details, rng)
-    named = replace(content, phrase=replace(phrase, tail=f"with {detail}"), details=())
-    return compose(named, held_out, used, rng)
-
-
-def _slots(content: Content, rng: np.random.Generator) -> dict[str, str]:
-    verb, participle = content.verb
-    return {
-        "a": content.phrase.a,
-        "the": content.phrase.the,
-        "np": content.phrase.bare,
-        "be": verb,
-        "ing": participle,
-        "stands": "is" if " " in verb else verb,
-    }
 
 
 @cache
@@ -129,11 +199,9 @@ def _fitting(section: str, kind: str, held_out: bool, participle: bool, tailed: 
     )  # fmt: skip
 
 
-def _choose(pool: Sequence[Frame], rng: np.random.Generator) -> Frame | None:
-    if not pool:
-        return None
-    weights = np.array([frame.share for frame in pool])
-    return pool[int(rng.choice(len(pool), p=weights / weights.sum()))]
+def _drawn(options: Sequence[_T], weights: Sequence[float], rng: np.random.Generator) -> _T:
+    shares = np.array(weights)
+    return options[int(rng.choice(len(options), p=shares / shares.sum()))]
 
 
 def _joined(places: Sequence[Location], template: str, rng: np.random.Generator) -> str:
@@ -143,7 +211,8 @@ def _joined(places: Sequence[Location], template: str, rng: np.random.Generator)
     after = template.partition("{at}")[2]
     # No comma before words that go on, and none after a short phrase.
     if first.kind == "place":
-        comma = "" if after[:1] == " " or (first.short and rng.random() < 0.6) else ","
+        short = len(first.text.split()) <= _SHORT
+        comma = "" if after[:1] == " " or (short and rng.random() < 0.6) else ","
         return f"{first.text}{comma} {second.text}"
     # "By the kiosk and the fountain" rather than "by the kiosk and next to the fountain".
     return f"{first.text} and {second.thing if first.key == second.key != 'between' else second.text}"
@@ -172,10 +241,5 @@ def _frame(
     pool = [frame for frame in frames("more", kind) if with_verb or "be" not in frame.slots]
     heard = {word for frame, _ in said for word in _LOOKING.findall(frame.text)}
     # "You'll see a keypad. You'll see it by the gate."
-    frame = _choose([f for f in pool if not heard & set(_LOOKING.findall(f.text))] or pool, rng)
-    assert frame is not None
-    return frame
-
-
-def _ended(text: str) -> str:
-    return text if text[-1] in ".?!" else f"{text}."
+    pool = [frame for frame in pool if not heard & set(_LOOKING.findall(frame.text))] or pool
+    return _drawn(pool, [frame.share for frame in pool], rng)

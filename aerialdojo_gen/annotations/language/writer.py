@@ -10,9 +10,8 @@ import numpy as np
 from aerialdojo_gen.annotations.claims import Claim, SceneClaims
 from aerialdojo_gen.annotations.language.choosing import About, Plan, choose
 from aerialdojo_gen.annotations.language.locations import LocationPhrases
-from aerialdojo_gen.annotations.language.nouns import Names
+from aerialdojo_gen.annotations.language.nouns import Names, fresh, phrase_of
 from aerialdojo_gen.annotations.language.sentences import Content, compose
-from aerialdojo_gen.annotations.language.subject import fresh, phrase_of
 from aerialdojo_gen.base.rng import generator
 
 # Words of a text, by level.

@@ -1,6 +1,6 @@
 """How hard a release's tasks are, what its splits leave unseen, what its goals show and how its references fly.
 
-A table is a row of measures, taken of groups of rows of the data frames of `aerialdojo_gen.dataset.stats.frames`.
+A table is a row of measures, taken of groups of rows of the data frames of `aerialdojo_gen.dataset.stats.measures`.
 """
 
 from __future__ import annotations
@@ -10,13 +10,76 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
+import pyarrow.compute as pc
+from numpy.typing import NDArray
 
 from aerialdojo_gen.base.constants import DETOUR
 from aerialdojo_gen.dataset.stats.comparison import Column, Comparison, Figure, Row
+from aerialdojo_gen.dataset.stats.tables import SETTING_NAMES, family_order
+from aerialdojo_gen.geometry.motion import DISPLACEMENTS, TURNS
 from aerialdojo_gen.geometry.part_visibility import FRONT_RAD
-from aerialdojo_gen.store.schemas import FAMILIES, SETTINGS
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.root import Where, open_root
+from aerialdojo_gen.store.schemas import SPLIT_COLUMNS
 
-SETTING_ROWS = dict(zip(SETTINGS, ("base", "standard", "long-horizon"), strict=True))
+# Before the goal the camera should see it, whichever way the drone goes.
+_ARRIVAL_M = 3.0
+_BELONGS = ("family", "scene_type", "partition")
+_ROUTE = (
+    "nav_id", "setting", "length_m", "detour_ratio", "n_actions", "min_clearance_m", "plan_detour",
+    "straight_line_free", "target_visible_at_start", "climb_m", "action",
+)  # fmt: skip
+_GOAL = ("object_id", "selected", "off_front_rad", "part_unoccluded", "part_framed")
+
+
+def read_tasks(data: Where, scenes: Sequence[str]) -> pd.DataFrame:
+    """Read a row per navigation task: where it belongs, its length, how hard it is, how its reference flies.
+
+    Truth values are 1 and 0, and NaN as numbers where the release says neither; `target_split` is empty there.
+    """
+    root = open_root(data)
+    parts = []
+    for scene in scenes:
+        belongs = store.read_scene(root, "release/scenes", scene, _BELONGS).to_pylist()[0]
+        for subset in ("train", "test"):
+            routes = store.read_scene(root, f"routes/{subset}", scene, _ROUTE)
+            tasks = store.read_scene(root, f"tasks/{subset}", scene, ["nav_id", *SPLIT_COLUMNS])
+            own = tasks.take(pc.index_in(routes["nav_id"], value_set=tasks["nav_id"].combine_chunks()))
+            columns = {name: routes[name] for name in _ROUTE} | {name: own[name] for name in SPLIT_COLUMNS}
+            columns |= {name: c.cast(pa.float64()) for name, c in columns.items() if pa.types.is_boolean(c.type)}
+            columns["target_split"] = pc.fill_null(columns["target_split"], "")
+            for name, value in {**belongs, "scene": scene, "subset": subset}.items():
+                columns[name] = pa.array([value] * routes.num_rows, pa.string())
+            parts.append(pa.table(columns))
+    table = pa.concat_tables(parts)
+    turns, ahead, sideways = _flown(table["action"].combine_chunks())
+    return table.drop_columns("action").to_pandas().assign(n_turns=turns, ahead_m=ahead, sideways_m=sideways)
+
+
+def _flown(lists: pa.ListArray) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+    """Turns of every route, and the metres that it flies ahead and sideways before the last three."""
+    counts = np.diff(lists.offsets.to_numpy()).astype(np.int64)
+    actions, first = lists.flatten().to_numpy(), np.cumsum(counts) - counts
+    metres = np.abs(DISPLACEMENTS[actions])
+    flown = np.cumsum(metres.sum(axis=1))
+    ends = np.repeat(flown[first + counts - 1], counts)
+    ahead, sideways = np.where((ends - flown >= _ARRIVAL_M)[:, None], metres[:, :2], 0.0).T
+    turns = (TURNS[actions] != 0).astype(np.int64)
+    return np.add.reduceat(turns, first), np.add.reduceat(ahead, first), np.add.reduceat(sideways, first)
+
+
+def read_goals(data: Where, scenes: Sequence[str]) -> pd.DataFrame:
+    """Read a row per object: its family, what its picture shows, and its selected anchor's scores."""
+    root = open_root(data)
+    parts = []
+    for scene in scenes:
+        family = store.read_scene(root, "release/scenes", scene, ["family"])["family"][0].as_py()
+        anchors = store.read_scene(root, "release/anchors", scene, _GOAL).to_pandas()
+        objects = store.read_scene(root, "release/objects", scene, ["object_id", "tells_shown", "step_back_m"])
+        chosen = anchors[anchors["selected"]].drop_duplicates("object_id", keep="last")
+        parts.append(objects.to_pandas().merge(chosen, on="object_id", how="left").assign(family=family))
+    return pd.concat(parts, ignore_index=True)
 
 
 class Measure(NamedTuple):
@@ -68,7 +131,7 @@ def _count(*conditions: tuple[str, object]) -> Callable[[pd.DataFrame], Figure]:
 
 
 def _by_setting(tasks: pd.DataFrame) -> dict[str, pd.DataFrame]:
-    return {name: tasks[tasks["setting"] == s] for s, name in SETTING_ROWS.items()} | {"all": tasks}
+    return {name: tasks[tasks["setting"] == s] for s, name in SETTING_NAMES.items()} | {"all": tasks}
 
 
 # The last two are of the table by setting alone: scenes fit a terminal without them.
@@ -128,7 +191,7 @@ def held_out_table(tasks: pd.DataFrame) -> Comparison:
     """Count the split by objects."""
     measures = (
         Measure("tasks", len),
-        *(Measure(name.replace("-horizon", ""), _count(("setting", s))) for s, name in SETTING_ROWS.items()),
+        *(Measure(name.replace("-horizon", ""), _count(("setting", s))) for s, name in SETTING_NAMES.items()),
         Measure("new target", _count(("target_held_out", 1.0))),
         Measure("new start", _count(("start_held_out", 1.0))),
         Measure("new both", _count(("target_held_out", 1.0), ("start_held_out", 1.0))),
@@ -165,8 +228,7 @@ def goal_table(goals: pd.DataFrame) -> Comparison:
         Measure("framed %", _share_of_known("part_framed"), "%"),
         Measure("back m", _quantile("step_back_m", 0.5), "m", 2),
     )
-    there = sorted(set(goals["family"]), key=lambda name: ([*FAMILIES.values(), name].index(name), name))
-    groups = {name: goals[goals["family"] == name] for name in there} | {"all": goals}
+    groups = {name: goals[goals["family"] == name] for name in family_order(goals["family"])} | {"all": goals}
     notes = (
         "fronts: objects with a front; front: of those, seen from within 60° of it.",
         "parts: of the objects that parts tell, those whose reference picture shows",

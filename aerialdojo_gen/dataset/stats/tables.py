@@ -16,6 +16,7 @@ from aerialdojo_gen.store.schemas import FAMILIES, SETTINGS
 
 _COUNTS = tuple(Column(name) for name in ("landmarks", "objects", "base", "standard", "long", "instances"))
 _KM = Column("km", "km", exact=False)
+SETTING_NAMES = dict(zip(SETTINGS, ("base", "standard", "long-horizon"), strict=True))
 
 
 @dataclass(frozen=True)
@@ -41,6 +42,12 @@ class Made:
     def instances(self) -> int:
         """Task instances: a navigation task has two."""
         return 2 * sum(self.tasks.values())
+
+
+def family_order(there: Iterable[str]) -> list[str]:
+    """Order families as the paper has them, others behind them by name."""
+    names = set(there)
+    return [*(family for family in FAMILIES.values() if family in names), *sorted(names - {*FAMILIES.values()})]
 
 
 def made_of(data: Where, scene: str) -> Made:
@@ -107,10 +114,8 @@ def scene_table(made: Sequence[Made]) -> Comparison:
 
 def family_table(made: Sequence[Made]) -> Comparison:
     """Table of the families, the paper's Table 2 (Types and Anchors) and the sums of its Table 10."""
-    there = {m.family for m in made}
-    names = [*(family for family in FAMILIES.values() if family in there), *sorted(there - {*FAMILIES.values()})]
     rows = []
-    for name in (*names, "all"):
+    for name in (*family_order(m.family for m in made), "all"):
         group = [m for m in made if name in (m.family, "all")]
         ours, papers = _figures(group), _paper_figures(group)
         known = len(group) if papers[0] is not None else None
@@ -142,12 +147,8 @@ def share_table(made: Sequence[Made]) -> Comparison:
         n = sum(m.instances for m in group)
         ours[partition] = share([n])
         ours[f"{partition} train"] = share((2 * m.of(s, "train") for m in group for s in SETTINGS), n)
-    names = {
-        **dict(zip(SETTINGS, ("base", "standard", "long-horizon"), strict=True)), "Mall": "malls",
-        "ID train": "ID: of these, train", "OOD train": "OOD: of these, train",
-    }  # fmt: skip
-    order = [*SETTINGS, *FAMILIES.values(), "Mall", "ID", "ID train", "OOD", "OOD train"]
-    rows = [Row(names.get(key, key), (ours[key],), (shares()[key] if whole else None,)) for key in order]
+    names = {"Mall": "malls", "ID train": "ID: of these, train", "OOD train": "OOD: of these, train"} | SETTING_NAMES
+    rows = [Row(names.get(key, key), (own,), (shares()[key] if whole else None,)) for key, own in ours.items()]
     title = "Shares of the task instances (the paper's appendix C)" if whole else "Shares of the task instances"
     return Comparison(title, "share of", (Column("%", "%", exact=False, digits=2),), tuple(rows))
 
@@ -205,7 +206,7 @@ def total_table(made: Sequence[Made]) -> Comparison:
     both = list(zip(ours, papers, strict=True))
     figures |= dict(zip(("landmarks", "objects"), both, strict=False))
     figures["object categories"] = len(frozenset().union(*(m.categories for m in made))), None
-    names = ("instances, base", "instances, standard", "instances, long-horizon", "instances")
+    names = (*(f"instances, {name}" for name in SETTING_NAMES.values()), "instances")
     figures |= dict(zip(names, both[2:6], strict=True))
     tasks = [None if n is None else int(n) // 2 for n in both[5]]
     figures["navigation tasks"] = tasks[0], tasks[1]

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from aerialdojo_gen.annotations.language.grammar import LEVELS
+from aerialdojo_gen.annotations.language.sentences import LEVELS
 from aerialdojo_gen.base.rng import generator, rank
 from aerialdojo_gen.dataset.stats.comparison import Listing
 from aerialdojo_gen.store import shards as store
@@ -39,7 +39,7 @@ def measure(texts: Sequence[str], owners: Sequence[object], frames: Sequence[str
     """Measure texts; `owners` are the objects that they describe, `frames` the derivations that they were made by."""
     tokens = [words_of(text) for text in texts]
     counts, built = Counter(word for words in tokens for word in words), Counter(frames)
-    lengths = sorted(map(len, tokens))
+    covered, lengths = np.cumsum([n for _, n in built.most_common()]), sorted(map(len, tokens))
     patterns = {name: sum(bool(p.search(t.lower())) for t in texts) / len(texts) for name, p in PATTERNS.items()}
     return {
         "texts": f"{len(texts):,}",
@@ -48,18 +48,13 @@ def measure(texts: Sequence[str], owners: Sequence[object], frames: Sequence[str
         "vocabulary": f"{len(counts):,}",
         "words that occur once": f"{sum(n == 1 for n in counts.values()):,}",
         "frames": f"{len(built):,}",
-        "frames that cover 99.9 %": f"{_covering(built, len(texts)):,}",
+        "frames that cover 99.9 %": f"{int(np.searchsorted(covered, 0.999 * len(texts)) + 1):,}",
         "most common frame": f"{max(built.values()) / len(texts):.2%}",
         "first four words shared": f"{_shared_openings(tokens, owners):.1%}",
         "distinct 1-, 2-, 3- and 4-grams": ", ".join(f"{_distinct(tokens, n):.3f}" for n in range(1, _LONGEST + 1)),
         "self-BLEU-4": f"{self_bleu(tokens, owners):.3f}",
         **{f"pattern: {name}": f"{share:.1%}" for name, share in patterns.items()},
     }
-
-
-def _covering(built: Counter[str], texts: int, share: float = 0.999) -> int:
-    covered = np.cumsum([n for _, n in built.most_common()])
-    return int(np.searchsorted(covered, share * texts) + 1)
 
 
 def _shared_openings(tokens: Sequence[Sequence[str]], owners: Sequence[object]) -> float:

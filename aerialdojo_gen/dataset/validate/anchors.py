@@ -6,7 +6,6 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from aerialdojo_gen.dataset.validate.foreign_keys import comparable
 from aerialdojo_gen.dataset.validate.registry import Finding, check
 from aerialdojo_gen.dataset.validate.rows import Floats, Ints, Rows, SceneData, at
 from aerialdojo_gen.geometry.frames import wrap_angle_rad, yaw_towards
@@ -85,7 +84,7 @@ def anchor_score(data: SceneData, rows: Rows) -> Iterator[Finding]:
             yield Finding(row, f"score = {score:.6g}", f"{expected:.6g} by its parts")
 
 
-@check("anchors", needs=("objects", "mesh"), after=("unknown_object",))
+@check("anchors", after=("unknown_object",))
 def anchor_front(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """An anchor says how far off its object's front it is; a goal more than 60 degrees off says why."""
     scene, nodes, off = data.mesh, data["objects"].texts("mesh_node"), rows.floats("off_front_rad")
@@ -106,7 +105,7 @@ def anchor_front(data: SceneData, rows: Rows) -> Iterator[Finding]:
             yield Finding(row, f"no_front_reason = {reasons[row]!r}", expected)
 
 
-@check("anchors", needs=("objects",), after=("unknown_object",))
+@check("anchors", after=("unknown_object",))
 def anchor_step(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A selected anchor steps back as far as its object's picture was taken, in centimetres."""
     back, most = rows.floats("step_back_m"), data.pipeline.anchor_sample.step_back_m
@@ -119,7 +118,7 @@ def anchor_step(data: SceneData, rows: Rows) -> Iterator[Finding]:
             yield Finding(row, f"step_back_m = {back[row]:.6g}", f"{stored[k]:g}, as far as its picture was taken")
 
 
-@check("viewpoints", needs=("objects", "mesh"), after=("viewpoint_object",))
+@check("viewpoints", after=("viewpoint_object",))
 def viewpoint_place(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A viewpoint is at the standoff from its object's surface and faces its centre; numbers count from 0."""
     expected = data.pipeline.anchor_sample.standoff_m
@@ -146,7 +145,7 @@ def _distances(data: SceneData, rows: Rows) -> Iterator[tuple[int, Ints, Floats]
             yield k, own, Surface.of(scene[str(nodes[k])]).distance_m(place[own])
 
 
-@check("viewpoints", needs=("mesh",), after=("viewpoint_place",))
+@check("viewpoints", after=("viewpoint_place",))
 def viewpoint_clearance(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A body can be at a viewpoint, inside the flight volume."""
     world, radius = data.world, data.pipeline.embodiment.radius_m
@@ -158,18 +157,18 @@ def viewpoint_clearance(data: SceneData, rows: Rows) -> Iterator[Finding]:
             yield Finding(row, "a place in collision", "a free one")
 
 
-@check("anchors", needs=("objects",), after=("unknown_object",))
+@check("anchors", after=("unknown_object",))
 def anchor_yaw(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """An anchor faces its object's centre, unless a person placed it."""
     item, own = data.objects_of(rows), rows.floats("yaw_rad")
     centre = at(data["objects"].floats("x_m", "y_m", "z_m").reshape(-1, 3), item)
     yaw = yaw_towards(rows.floats("x_m", "y_m", "z_m"), centre)
-    fit = comparable(data, "objects", item) & (rows.texts("selected_by") != "annotation")
+    fit = data.comparable("objects", item) & (rows.texts("selected_by") != "annotation")
     for row in np.flatnonzero(fit & (np.abs(wrap_angle_rad(own - yaw)) > _SAME_RAD)):
         yield Finding(int(row), f"{own[row]:.6f} rad", f"{yaw[row]:.6f} rad")
 
 
-@check("anchors", needs=("objects", "mesh"), after=("unknown_object",))
+@check("anchors", after=("unknown_object",))
 def anchor_surface(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """An anchor is 1 m from its object's surface (about that, where a person placed it), and says how far."""
     annotated = rows.texts("selected_by") == "annotation"
@@ -183,7 +182,7 @@ def anchor_surface(data: SceneData, rows: Rows) -> Iterator[Finding]:
                 yield Finding(row, f"surface_distance_m = {stored[row]:.6g}", f"{distance:.6g}")
 
 
-@check("anchors", needs=("mesh",), after=("anchor_surface",))
+@check("anchors", after=("anchor_surface",))
 def anchor_clearance(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """An anchor is free of collision, and says how far the nearest surface is."""
     world, radius = data.world, data.pipeline.embodiment.radius_m

@@ -20,6 +20,8 @@ from aerialdojo_gen.store.schemas import SETTINGS, SUBSETS
 
 # The paper's summed length of all routes is met to within this share, where all of its scenes are there.
 _PATH_SHARE = 0.005
+_SPLIT = ("tasks", "routes")
+_NO_PAPER_COUNTS = "the pipeline has no paper_counts"
 
 
 @dataclass
@@ -37,7 +39,7 @@ class SceneCounts:
 def count_scene(data: SceneData, complete: bool) -> SceneCounts:
     """Count what a scene holds."""
     counts = SceneCounts(data.scene, complete)
-    for rows in (data[name] for name in ("tasks", "routes") if name in data.tables):
+    for rows in (data[name] for name in _SPLIT if name in data.tables):
         folders = [rows.parts[k].split("/")[-2] for k in rows.part_of]
         counts.rows.update((rows.name, folder) for folder in folders)
         if rows.name == "routes":
@@ -52,26 +54,26 @@ def scene_counts(data: SceneData, counts: SceneCounts) -> Outcome:
     """Hold a scene's landmarks, objects and tasks by setting and subset to the paper's, where the paper has it."""
     outcome = Outcome("scene_counts", "counts")
     paper_scene = inventory().get(data.scene)
-    if paper_scene is None or not data.pipeline.split.paper_counts:
-        outcome.skipped = "no scene of the paper" if paper_scene is None else "the pipeline has no paper_counts"
-        return outcome
-    if not counts.complete:
+    if paper_scene is None:
+        outcome.skipped = "no scene of the paper"
+    elif not data.pipeline.split.paper_counts:
+        outcome.skipped = _NO_PAPER_COUNTS
+    elif not counts.complete:
         outcome.skipped = "the scene cannot be read"
+    if paper_scene is None or outcome.skipped:
         return outcome
     from aerialdojo_gen.pipeline.stages.work.candidate_policy import train_quotas
 
     trains = train_quotas(data.scene, inventory(), splits())
     side = store.partition(data.scene)
-    expected = {"landmarks": paper_scene.landmarks, "objects": paper_scene.objects}
-    found = {"landmarks": len(data["landmarks"]), "objects": len(data["objects"])}
+    pairs = {name: (len(data[name]), getattr(paper_scene, name)) for name in ("landmarks", "objects")}
     for setting in SETTINGS:
         for subset, n in (("train", trains[setting]), ("test", paper_scene.tasks[setting] - trains[setting])):
-            expected[f"{subset} {setting} tasks"] = n
-            found[f"{subset} {setting} tasks"] = counts.routes[f"{side}_{subset}", setting]
-    for name, n in expected.items():
-        outcome.rows += 1
-        if found[name] != n:
-            outcome.fault(f"{found[name]:,}", f"{n:,}", scene=data.scene, key=name)
+            pairs[f"{subset} {setting} tasks"] = counts.routes[f"{side}_{subset}", setting], n
+    outcome.rows = len(pairs)
+    for name, (found, n) in pairs.items():
+        if found != n:
+            outcome.fault(f"{found:,}", f"{n:,}", scene=data.scene, key=name)
     return outcome
 
 
@@ -81,24 +83,19 @@ def whole_counts(
     """Check what needs all scenes together."""
     partial = "" if all(counts.complete for counts in totals) else "a scene cannot be read"
     partial = partial if every_scene else "only some scenes were selected"
-    paper = partial or _not_the_papers(totals, pipeline)
-    outcomes = [Outcome(name, "counts", skipped=paper if name in _OF_PAPER else partial) for name in WHOLE_CHECKS]
-    for outcome, judge in zip(outcomes, (_splits, _path, _card, _images), strict=True):
+    missing = len(set(inventory()) - {counts.scene for counts in totals})
+    no_paper = f"{missing} of the paper's {len(inventory())} scenes are not in it" if missing else ""
+    no_paper = partial or (no_paper if pipeline.split.paper_counts else _NO_PAPER_COUNTS)
+    checks = {split_counts: no_paper, path_total: no_paper, card_counts: partial, image_id_shared: partial}
+    outcomes = [Outcome(judge.__name__, "counts", skipped=reason) for judge, reason in checks.items()]
+    for outcome, judge in zip(outcomes, checks, strict=True):
         if not outcome.skipped:
             judge(outcome, release, totals)
     return outcomes
 
 
-WHOLE_CHECKS = {
-    "split_counts": "All scenes together have the paper's numbers of train and test tasks, and its total.",
-    "path_total": "The routes' summed length is the paper's to within 0.5 %.",
-    "card_counts": "The dataset card tells the numbers that are there.",
-    "image_id_shared": "A picture's id stands in one scene.",
-}
-_OF_PAPER = ("split_counts", "path_total")
-
-
-def _splits(outcome: Outcome, _release: Release, totals: Sequence[SceneCounts]) -> None:
+def split_counts(outcome: Outcome, _release: Release, totals: Sequence[SceneCounts]) -> None:
+    """All scenes together have the paper's numbers of train and test tasks, and its total."""
     for (side, subset), settings in splits().items():
         folder = f"{side.lower()}_{subset}"
         for setting, n in settings.items():
@@ -108,7 +105,8 @@ def _splits(outcome: Outcome, _release: Release, totals: Sequence[SceneCounts]) 
                 outcome.fault(f"{found:,}", f"{n:,}", part=f"routes/{folder}", key=f"{setting} tasks")
 
 
-def _path(outcome: Outcome, _release: Release, totals: Sequence[SceneCounts]) -> None:
+def path_total(outcome: Outcome, _release: Release, totals: Sequence[SceneCounts]) -> None:
+    """The routes' summed length is the paper's to within 0.5 %."""
     found, expected = sum(one.path_m for one in totals), sum(scene.path_m for scene in inventory().values())
     outcome.rows = 1
     if abs(found - expected) > _PATH_SHARE * expected:
@@ -116,24 +114,31 @@ def _path(outcome: Outcome, _release: Release, totals: Sequence[SceneCounts]) ->
         outcome.fault(*stated, table="routes")
 
 
-def _card(outcome: Outcome, release: Release, totals: Sequence[SceneCounts]) -> None:
-    card = _text(release, "README.md")
+def card_counts(outcome: Outcome, release: Release, totals: Sequence[SceneCounts]) -> None:
+    """The dataset card tells the numbers that are there."""
+    card, machine = (_text(release, name) for name in ("README.md", "croissant.json"))
     if card is None:
         outcome.rows = 1
         outcome.fault("no file", "the dataset card", part="README.md")
         return
-    stated = _of_card(card)
-    machine = _text(release, "croissant.json")
+    # Rows of `tasks` and `routes` by split: the card's table of splits, and the descriptions of record sets.
+    table = re.findall(r"^\| `(\w+)` \| ([\d,]+) \| ([\d,]+) \|", card, re.MULTILINE)
+    named = (("README.md", split, pair) for split, *numbers in table for pair in zip(_SPLIT, numbers, strict=True))
+    stated = [(file, name, split, n) for file, split, (name, n) in named if split in SUBSETS]
     if machine is not None:
         try:
-            stated += _of_croissant(machine)
+            described = {one["name"]: one["description"] for one in loads_json(machine)["recordSet"]}
         except (ValueError, KeyError, TypeError):
+            described = {}
             outcome.fault("no record sets", "a Croissant description", part="croissant.json")
-    for file, table, folder, n in stated:
+        for name in _SPLIT:
+            rows = re.findall(r"(\w+) \(([\d,]+) rows\)", described.get(name, ""))
+            stated += [("croissant.json", name, split, n) for split, n in rows]
+    for file, name, split, n in stated:
         outcome.rows += 1
-        found = sum(counts.rows[table, folder] for counts in totals)
-        if n != found:
-            outcome.fault(f"{n:,} rows told", f"{found:,}", table=table, part=file, key=folder)
+        found = sum(counts.rows[name, split] for counts in totals)
+        if int(n.replace(",", "")) != found:
+            outcome.fault(f"{n} rows told", f"{found:,}", table=name, part=file, key=split)
     if not outcome.rows:
         outcome.skipped = "neither card nor croissant.json tells the rows of the splits"
 
@@ -146,24 +151,8 @@ def _text(release: Release, relative: str) -> str | None:
     return path.read_text(encoding="utf-8", errors="replace") if path.is_file() else None
 
 
-def _of_card(text: str) -> list[tuple[str, str, str, int]]:
-    """Rows of `tasks` and `routes` by split, as the card's table of splits has them."""
-    found = re.findall(r"^\| `(\w+)` \| ([\d,]+) \| ([\d,]+) \|", text, re.MULTILINE)
-    counted = [(folder, ("tasks", a), ("routes", b)) for folder, a, b in found if folder in SUBSETS]
-    return [("README.md", t, folder, int(n.replace(",", ""))) for folder, *both in counted for t, n in both]
-
-
-def _of_croissant(text: str) -> list[tuple[str, str, str, int]]:
-    """Rows of `tasks` and `routes` by split, as croissant.json describes its record sets."""
-    described = {one["name"]: one["description"] for one in loads_json(text)["recordSet"]}
-    return [
-        ("croissant.json", table, folder, int(n.replace(",", "")))
-        for table in ("tasks", "routes")
-        for folder, n in re.findall(r"(\w+) \(([\d,]+) rows\)", described.get(table, ""))
-    ]
-
-
-def _images(outcome: Outcome, _release: Release, totals: Sequence[SceneCounts]) -> None:
+def image_id_shared(outcome: Outcome, _release: Release, totals: Sequence[SceneCounts]) -> None:
+    """A picture's id stands in one scene."""
     first: dict[str, str] = {}
     for counts in totals:
         for image_id in counts.images:
@@ -171,10 +160,3 @@ def _images(outcome: Outcome, _release: Release, totals: Sequence[SceneCounts]) 
             if first.setdefault(image_id, counts.scene) != counts.scene:
                 key, found = f"reference_image_id={image_id}", f"of {first[image_id]} too"
                 outcome.fault(found, "one scene", scene=counts.scene, table="objects", key=key)
-
-
-def _not_the_papers(totals: Sequence[SceneCounts], pipeline: Pipeline) -> str:
-    if not pipeline.split.paper_counts:
-        return "the pipeline has no paper_counts"
-    missing = len(set(inventory()) - {counts.scene for counts in totals})
-    return f"{missing} of the paper's {len(inventory())} scenes are not in it" if missing else ""

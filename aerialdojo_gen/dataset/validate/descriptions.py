@@ -10,17 +10,15 @@ from __future__ import annotations
 
 import contextlib
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Any
 
-from aerialdojo_gen.annotations.claims import Claim, SceneClaims
+from aerialdojo_gen.annotations.claims import Claim, SceneClaims, claims_from_json
 from aerialdojo_gen.annotations.format import Landmark
 from aerialdojo_gen.annotations.matching import Matcher
-from aerialdojo_gen.annotations.relations import SceneGeometry
 from aerialdojo_gen.annotations.vocabulary import Vocabulary
 from aerialdojo_gen.base.constants import DIRECTIONS
 from aerialdojo_gen.base.errors import AerialDojoError
-from aerialdojo_gen.base.safe_parse import loads_json
 from aerialdojo_gen.dataset.validate.registry import Finding, check
 from aerialdojo_gen.dataset.validate.rows import Rows, SceneData, UncheckedError
 from aerialdojo_gen.scenes.catalogue import load_catalogue
@@ -46,53 +44,53 @@ _ANY_COLOUR = f"({'|'.join(_COLOURS)})"
 _NO_PART = {*_COLOURS, "and", "dark", "light", "pale", "bright", "deep"}
 
 
-@check("objects", needs=("landmarks", "mesh"), after=_FAULTS)
+@check("objects", after=_FAULTS)
 def object_claims(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """Every claim about an object is so of the mesh, and of the very things that it names."""
-    known = _scene_claims(data)
-    for row, i in _placed(known, rows):
+    scene_claims = _scene_claims(data)
+    for row, i in _placed(scene_claims, rows):
         claims = _claims(rows, row)
         if claims is None:
             yield Finding(row, f"claims = {str(rows.texts('claims')[row])[:80]!r}", "a JSON list of claims")
-        elif wrong := next((claim for claim in claims if not known.is_true(claim, i)), None):
+        elif wrong := next((claim for claim in claims if not scene_claims.is_true(claim, i)), None):
             said = f"{wrong.kind} {wrong.key!r} {' and '.join(thing.node for thing in wrong.things)}".strip()
             yield Finding(row, f"it claims {said}", f"what is so of {data.mesh.instances[i].node}")
 
 
-@check("objects", needs=("landmarks", "mesh"), after=_FAULTS)
+@check("objects", after=_FAULTS)
 def object_words(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """Names and texts name their own thing, and say no value, relation or direction that is not so in the mesh."""
-    known, matcher, instances = _scene_claims(data), _matcher(data), data.mesh.instances
-    for row, i in _placed(known, rows):
+    scene_claims, matcher, instances = _scene_claims(data), _matcher(data), data.mesh.instances
+    for row, i in _placed(scene_claims, rows):
         made = {one["text"] for one in _made(rows, row) if one["claims"]}
         for column, text in (("name", rows.texts("name")[row] or ""), *_texts(rows, row)):
             # What was made of claims is held to these, not read back.
             wrong = "" if text in made else next(iter(matcher.faults(i, text)), "")
             wrong = wrong or _recoloured(instances[i], text)
-            if wrong := wrong or _turned(known, i, text):
+            if wrong := wrong or _turned(scene_claims, i, text):
                 yield Finding(row, f"{column} = {text!r}: {wrong}", f"what is so of {instances[i].node}")
                 break
 
 
-@check("objects", needs=("landmarks", "mesh"), after=(*_FAULTS, "object_words", "object_claims"))
+@check("objects", after=(*_FAULTS, "object_words", "object_claims"))
 def object_ambiguous(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A text fits nothing else of its category in the same direction of the same landmark."""
-    known, matcher, instances = _scene_claims(data), _matcher(data), data.mesh.instances
-    for row, i in _placed(known, rows):
+    scene_claims, matcher = _scene_claims(data), _matcher(data)
+    for row, i in _placed(scene_claims, rows):
         own = _claims(rows, row) or []
         made = [(one["text"], one["claims"]) for one in _made(rows, row) if one["claims"]]
         texts = [(text, [own[k] for k in chosen if k < len(own)]) for text, chosen in made]
-        told = {text for text, _ in made}
-        texts += [(t, matcher.true_claims(i, t)) for _, t in _texts(rows, row) if t not in told]
+        made_texts = {text for text, _ in made}
+        texts += [(t, matcher.true_claims(i, t)) for _, t in _texts(rows, row) if t not in made_texts]
         for text, claims in texts or [("all that is claimed", own)]:
-            if others := _listed(instances, known.distractors(i, claims)):
+            if others := scene_claims.listed(scene_claims.distractors(i, claims)):
                 yield Finding(row, f"{text!r}, which fits {others} as well", "words that fit one thing")
                 break
 
 
-def _placed(known: SceneClaims, rows: Rows) -> Iterator[tuple[int, int]]:
+def _placed(scene_claims: SceneClaims, rows: Rows) -> Iterator[tuple[int, int]]:
     """Rows whose node is in the mesh, and its index there."""
-    index = known.geometry.index
+    index = scene_claims.geometry.index
     yield from ((row, index[str(node)]) for row, node in enumerate(rows.texts("mesh_node")) if node in index)
 
 
@@ -111,27 +109,22 @@ def _texts(rows: Rows, row: int) -> list[tuple[str, str]]:
 def _claims(rows: Rows, row: int) -> list[Claim] | None:
     """Read an object's claims; None where they are malformed."""
     try:
-        raw = loads_json(str(rows.texts("claims")[row]))
-        return [Claim.from_json(one) for one in raw] if isinstance(raw, list) else None
+        return claims_from_json(str(rows.texts("claims")[row]))
     except (AerialDojoError, ValueError):
         return None
 
 
-def _turned(known: SceneClaims, i: int, text: str) -> str:
+def _turned(scene_claims: SceneClaims, i: int, text: str) -> str:
     """Say which direction from the object's own landmark a text says, where the goal says another."""
-    bearing = known.bearings[i]
+    bearing = scene_claims.bearings[i]
     if bearing is None:
         return ""
-    node = known.scene.instances[known.landmarks[bearing.landmark]].node
-    name = next(name for name, own in known.landmark_names.items() if own == node)
+    node = scene_claims.scene.instances[scene_claims.landmarks[bearing.landmark]].node
+    name = next(name for name, own in scene_claims.landmark_names.items() if own == node)
     plain = re.sub(r"\b(north|south)[- ](east|west)", r"\1\2", text.lower())
     said = re.findall(rf"\b({'|'.join(DIRECTIONS)})(?:ern)?(?: side)? of the {re.escape(name)}\b", plain)
     wrong = [direction for direction in said if direction != bearing.direction]
     return f"{wrong[0]} of the {name}, and the goal says {bearing.direction}" if wrong else ""
-
-
-def _listed(instances: Sequence[Instance], some: Sequence[int]) -> str:
-    return ", ".join(instances[j].node for j in some[:3]) + ("..." if len(some) > 3 else "")
 
 
 @check("objects", after=("object_words",))
@@ -147,15 +140,15 @@ def text_form(_data: SceneData, rows: Rows) -> Iterator[Finding]:
                 yield Finding(row, f"{name} = {text!r}", "printable letters")
 
 
-@check("landmarks", needs=("mesh",), after=("landmark_node",))
+@check("landmarks", after=("landmark_node",))
 def landmark_name(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A landmark's name is one of a kind, names its own thing, and says no value that the mesh does not bear out."""
-    known, matcher, instances = _scene_claims(data), _matcher(data), data.mesh.instances
+    scene_claims, matcher, instances = _scene_claims(data), _matcher(data), data.mesh.instances
     first = dict[str, int]()
-    for row, i in _placed(known, rows):
+    for row, i in _placed(scene_claims, rows):
         text = rows.texts("name")[row] or ""
         wrong = next(iter(matcher.faults(i, text)), "") or _recoloured(instances[i], text)
-        wrong = wrong or _other_side(known, i, text)
+        wrong = wrong or _other_side(scene_claims, i, text)
         if first.setdefault(text.lower(), row) != row:
             wrong = f"as {rows.key(first[text.lower()])}"
         if wrong:
@@ -185,7 +178,7 @@ def _read_claims(data: SceneData) -> SceneClaims:
     named = zip(marks.ints("landmark_id").tolist(), map(str, marks.texts("name")), nodes, strict=True)
     landmarks = [Landmark.model_construct(id=k, name=name, node=node) for k, name, node in named]
     landmarks.sort(key=lambda mark: mark.id)
-    return SceneClaims(Vocabulary(scene, catalogue), landmarks, SceneGeometry(scene))
+    return SceneClaims(Vocabulary(scene, catalogue), landmarks)
 
 
 def _recoloured(instance: Instance, text: str) -> str:
@@ -210,11 +203,11 @@ def _recoloured(instance: Instance, text: str) -> str:
     return ""
 
 
-def _other_side(known: SceneClaims, i: int, text: str) -> str:
+def _other_side(scene_claims: SceneClaims, i: int, text: str) -> str:
     """Say which side a landmark is said to be on of its like, where it is on another."""
-    geometry = known.geometry
+    geometry = scene_claims.geometry
     category = geometry.scene.instances[i].category
-    alike = [j for j in known.landmarks if j != i and geometry.scene.instances[j].category == category]
+    alike = [j for j in scene_claims.landmarks if j != i and geometry.scene.instances[j].category == category]
     for side, (dx, dy) in _SIDES.items():
         if alike and side in _split(text):
             offset = geometry.centres[i, :2] - geometry.centres[alike, :2].mean(axis=0)

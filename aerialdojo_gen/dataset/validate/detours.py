@@ -41,11 +41,11 @@ _WIDE = SearchAttempt(weight=0.97, budget=400_000, duplicate_cell_m=0.25)
 _SHORTER_M, _SHORTER_SHARE = 1.0, 0.15
 
 
-@check("routes", needs=("mesh",), after=_FITS, samples=True)
-def needless_piece(data: SceneData, _rows: Rows) -> Iterator[Finding]:
+@check("routes", after=_FITS, samples=True)
+def needless_piece(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """No piece of a route is flown for nothing: the straight way between its ends is blocked, or hardly shorter."""
     world, room = data.world, data.pipeline.embodiment.radius_m + _ROOM_M
-    for row in data.sampled_routes(*_FITS):
+    for row in data.sampled(rows).tolist():
         positions = data.paths.xyz[data.paths.of(row)]
         if not np.isfinite(positions).all():
             continue
@@ -58,13 +58,13 @@ def needless_piece(data: SceneData, _rows: Rows) -> Iterator[Finding]:
                 break
 
 
-@check("routes", needs=("mesh", "anchors"), after=(*_FITS, "goal_anchor", "end_position"))
+@check("routes", after=(*_FITS, "goal_anchor", "end_position"))
 def long_way_round(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """No route is much longer than a way over a grid of 1 m cells, found anew from every goal."""
     paths = data.paths
     goals = rows.floats("goal_x_m", "goal_y_m", "goal_z_m")
     finite = np.isfinite(goals).all(axis=1) & np.isfinite(paths.starts).all(axis=1)
-    fit = np.flatnonzero(finite & ~data.flagged("routes", (*_FITS, "goal_anchor", "end_position")))
+    fit = np.flatnonzero(finite & rows.judged)
     if not len(fit):
         return
     plan, embodiment = data.pipeline.plan, data.pipeline.embodiment

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 
 from aerialdojo_gen.dataset.validate.registry import Finding, check
-from aerialdojo_gen.dataset.validate.rows import Floats, Mask, Rows, SceneData, UncheckedError, at, pairs_of
+from aerialdojo_gen.dataset.validate.rows import Floats, Mask, Rows, SceneData, UncheckedError, at
 from aerialdojo_gen.geometry.cameras import Camera, project, view_pose
 from aerialdojo_gen.geometry.motion import DISPLACEMENTS, replay
 from aerialdojo_gen.geometry.rays import instance_caster
@@ -118,12 +118,12 @@ def agent_action(data: SceneData, rows: Rows) -> Iterator[Finding]:
             yield Finding(row, landed, f"{most_m:.3g} m and {budget} actions at most")
 
 
-@check("routes", needs=("mesh",), after=(*_OF_ROUTE, "difficulty_told"), samples=True)
+@check("routes", after=(*_OF_ROUTE, "difficulty_told"), samples=True)
 def straight_line(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """`straight_line_free` is true where the body's sweep from start to goal touches nothing, else false."""
     world, radius = data.world, data.pipeline.embodiment.radius_m
     paths, stored = data.paths, rows.floats("straight_line_free")
-    for row in data.sampled_routes(*_OF_ROUTE):
+    for row in data.sampled(rows).tolist():
         if not np.isfinite(stored[row]):
             continue
         start, goal = paths.starts[row, :3], paths.ends[row, :3]
@@ -132,7 +132,7 @@ def straight_line(data: SceneData, rows: Rows) -> Iterator[Finding]:
             yield Finding(row, f"straight_line_free = {free}", str(not free))
 
 
-@check("routes", needs=("mesh", "objects"), after=(*_OF_ROUTE, "difficulty_told"), samples=True)
+@check("routes", after=(*_OF_ROUTE, "difficulty_told"), samples=True)
 def start_view(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """What the start sees of the target is what its pictures would show, and the view is the one that shows most."""
     paths, n = data.paths, data.pipeline.pair_objects.surface_points
@@ -140,7 +140,7 @@ def start_view(data: SceneData, rows: Rows) -> Iterator[Finding]:
     nodes, ids = data["objects"].texts("mesh_node"), data["objects"].ints("object_id").tolist()
     stored, views = rows.floats("target_visible_at_start"), rows.texts("visible_view_at_start")
     of_target: dict[int, list[int]] = {}
-    for row in data.sampled_routes(*_OF_ROUTE):
+    for row in data.sampled(rows).tolist():
         if np.isfinite(stored[row]):
             of_target.setdefault(int(data.target_of_route[row]), []).append(row)
     for target, routes in of_target.items():
@@ -209,7 +209,7 @@ def _in_pictures(starts: Floats, points: Floats) -> Mask:
     return np.array(inside)
 
 
-@check("tasks", needs=("routes",), after=_OF_TASK)
+@check("tasks", after=_OF_TASK)
 def seen_in_train(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """`target_`, `start_` and `pair_seen_in_train` are true where a training task has that target, start, pair."""
     train = rows.texts("subset") == "train"
@@ -225,13 +225,15 @@ def seen_in_train(data: SceneData, rows: Rows) -> Iterator[Finding]:
             yield Finding(int(row), f"{name} = {bool(stored[row])}", str(bool(expected[row])))
 
 
-@check("tasks", needs=("routes", "objects"), after=_OF_TASK)
+@check("tasks", after=_OF_TASK)
 def split_by_objects(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """`target_split` is train where neither end of the task is at an object that is held out, and test elsewhere."""
     routes, fraction = data["routes"], data.pipeline.split.held_out_fraction
     ids = data["objects"].ints("object_id").tolist()
     key = key_of(data.pipeline.split.salt, data.pipeline.seed)
-    out = held_out(data.scene, ids, fraction, key) if _has_salt(data, key) else None
+    # One id says whether the release was made with this salt.
+    made = [nav_id(data.scene, pair, key) for pair in routes.pairs()[:1]]
+    out = held_out(data.scene, ids, fraction, key) if made == routes.texts("nav_id")[:1].tolist() else None
     complete = _known(rows, *_SPLITS).all(axis=1)
     split = rows.texts("target_split")
     is_held_out = {end: rows.floats(f"{end}_held_out") for end in ("target", "start")}
@@ -248,12 +250,6 @@ def split_by_objects(data: SceneData, rows: Rows) -> Iterator[Finding]:
             if bool(is_held_out[end][row]) != expected:
                 yield Finding(row, f"{end}_held_out = {bool(is_held_out[end][row])}", str(expected))
                 break
-
-
-def _has_salt(data: SceneData, key: bytes) -> bool:
-    """Whether the release's ids were made with a key, by one of them."""
-    routes = data["routes"]
-    return [nav_id(data.scene, pair, key) for pair in pairs_of(routes)[:1]] == routes.texts("nav_id")[:1].tolist()
 
 
 @check("tasks")

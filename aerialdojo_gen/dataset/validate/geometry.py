@@ -8,7 +8,6 @@ from collections.abc import Iterator
 import numpy as np
 
 from aerialdojo_gen.base.constants import NEAR_GOAL_M
-from aerialdojo_gen.dataset.validate.foreign_keys import comparable
 from aerialdojo_gen.dataset.validate.registry import Finding, check
 from aerialdojo_gen.dataset.validate.rows import (
     POSE,
@@ -17,9 +16,7 @@ from aerialdojo_gen.dataset.validate.rows import (
     Mask,
     Rows,
     SceneData,
-    UncheckedError,
     at,
-    list_lengths,
     place_text,
     pose_text,
 )
@@ -36,7 +33,7 @@ _REPLAY = 1e-5
 @check("routes")
 def list_lengths_differ(_data: SceneData, rows: Rows) -> Iterator[Finding]:
     """The five lists of a route are of equal length, two poses at least."""
-    lengths = list_lengths(rows)
+    lengths = rows.list_lengths()
     for row in np.flatnonzero((lengths != lengths[:, :1]).any(axis=1) | (lengths[:, 0] < 2)):
         yield Finding(int(row), f"lists of {', '.join(str(n) for n in lengths[row])}", "one length, 2 or more")
 
@@ -47,7 +44,8 @@ def action_order(data: SceneData, _rows: Rows) -> Iterator[Finding]:
     for row in np.flatnonzero(data.paths.fit).tolist():
         actions = data.paths.action[data.paths.of(row)]
         if actions[-1] != STOP or (actions[:-1] <= STOP).any() or (actions > APPROACH).any():
-            yield Finding(row, f"actions {_some(actions)}", "Stop (0) at the last pose alone")
+            shown = actions.tolist() if len(actions) <= 8 else f"[… {', '.join(map(str, actions[-8:]))}]"
+            yield Finding(row, f"actions {shown}", "Stop (0) at the last pose alone")
         elif (actions[:-2] == APPROACH).any():
             yield Finding(row, f"Approach at pose {int(np.flatnonzero(actions == APPROACH)[0])}", "the last but one")
 
@@ -97,17 +95,15 @@ def route_setting(data: SceneData, rows: Rows) -> Iterator[Finding]:
         yield Finding(int(row), str(stored[row]), f"{setting[row]}, for {length[row]:.4f} m")
 
 
-@check("routes", needs=("scenes",), after=("list_lengths_differ",))
+@check("routes", after=("list_lengths_differ",))
 def out_of_bounds(data: SceneData, _rows: Rows) -> Iterator[Finding]:
     """The body never leaves the flight volume."""
-    paths, scenes = data.paths, data["scenes"]
-    if len(scenes) != 1:
-        raise UncheckedError("the scene's row is at fault")
-    radius = data.pipeline.embodiment.radius_m
-    low, high = (scenes.floats(*(f"{e}_{a}_m" for a in "xyz"))[0] for e in ("min", "max"))
+    paths, radius = data.paths, data.pipeline.embodiment.radius_m
+    low, high = (np.array([data.scene_row[f"{end}_{axis}_m"] for axis in "xyz"]) for end in ("min", "max"))
     outside = ((paths.xyz < low + radius - _LENGTH_M) | (paths.xyz > high - radius + _LENGTH_M)).any(axis=1)
     poses = np.flatnonzero(outside)
-    box = f"{radius:g} m inside {_corner(low)} to {_corner(high)}"
+    corners = ["(" + ", ".join(f"{v:g}" for v in corner.tolist()) + ") m" for corner in (low, high)]
+    box = f"{radius:g} m inside {corners[0]} to {corners[1]}"
     for row, first in zip(*np.unique(paths.route_of(poses), return_index=True), strict=True):
         pose = poses[first]
         yield Finding(int(row), f"pose {pose - paths.first[row]} at {place_text(paths.xyz[pose])}", box)
@@ -132,16 +128,7 @@ def _differs(stored: Floats, computed: Floats, unit: str) -> Iterator[Finding]:
         yield Finding(row, f"{stored[row]:.9g}{unit}", f"{computed[row]:.9g}{unit}")
 
 
-def _some(actions: np.ndarray) -> str:
-    shown = actions.tolist()
-    return str(shown) if len(shown) <= 8 else f"[… {', '.join(str(a) for a in shown[-8:])}]"
-
-
-def _corner(point: Floats) -> str:
-    return "(" + ", ".join(f"{v:g}" for v in point.tolist()) + ") m"
-
-
-@check("routes", needs=("anchors",), after=("list_lengths_differ", "unknown_start"))
+@check("routes", after=("list_lengths_differ", "unknown_start"))
 def start_anchor(data: SceneData, _rows: Rows) -> Iterator[Finding]:
     """A route starts on its start anchor, turned by 180°."""
     fit, anchor = _anchor_poses(data, data.start_of_route)
@@ -149,14 +136,14 @@ def start_anchor(data: SceneData, _rows: Rows) -> Iterator[Finding]:
     yield from _off(fit, data.paths.starts, anchor)
 
 
-@check("routes", needs=("anchors",), after=("unknown_target",))
+@check("routes", after=("unknown_target",))
 def goal_anchor(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """The goal is the target's selected anchor."""
     fit, anchor = _anchor_poses(data, data.goal_of_route)
     yield from _off(fit, rows.floats(*(f"goal_{name}" for name in POSE)), anchor)
 
 
-@check("routes", needs=("anchors",), after=("list_lengths_differ", "unknown_target"))
+@check("routes", after=("list_lengths_differ", "unknown_target"))
 def end_position(data: SceneData, _rows: Rows) -> Iterator[Finding]:
     """The last position is the target's selected anchor."""
     fit, anchor = _anchor_poses(data, data.goal_of_route)
@@ -164,7 +151,7 @@ def end_position(data: SceneData, _rows: Rows) -> Iterator[Finding]:
     yield from _off(fit, data.paths.ends, anchor)
 
 
-@check("routes", needs=("anchors",), after=("list_lengths_differ", "unknown_target"))
+@check("routes", after=("list_lengths_differ", "unknown_target"))
 def final_yaw(data: SceneData, _rows: Rows) -> Iterator[Finding]:
     """The last yaw is within 7.5° of the anchor's."""
     fit, anchor = _anchor_poses(data, data.goal_of_route)
@@ -174,10 +161,10 @@ def final_yaw(data: SceneData, _rows: Rows) -> Iterator[Finding]:
 
 
 @check("routes", after=("list_lengths_differ", "action_order"))
-def replay_differs(data: SceneData, _rows: Rows) -> Iterator[Finding]:
+def replay_differs(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """The actions, replayed through the motion model, give the stored poses (up to the Approach)."""
     paths = data.paths
-    for row in np.flatnonzero(paths.fit & ~data.flagged("routes", ("action_order",))).tolist():
+    for row in np.flatnonzero(paths.fit & rows.judged).tolist():
         poses, actions = paths.poses(row), paths.action[paths.of(row)]
         flown = replay(poses[0], actions[:-1])
         off = np.abs(flown - poses)
@@ -189,8 +176,7 @@ def replay_differs(data: SceneData, _rows: Rows) -> Iterator[Finding]:
             yield Finding(row, f"pose {step} at {pose_text(poses[step])}", f"{pose_text(flown[step])}")
 
 
-@check("routes", needs=("anchors",), after=("list_lengths_differ", "action_order", "replay_differs", "end_position",
-                                            "unknown_target"))  # fmt: skip
+@check("routes", after=("list_lengths_differ", "action_order", "replay_differs", "end_position", "unknown_target"))
 def stops_far(data: SceneData, _rows: Rows) -> Iterator[Finding]:
     """An agent that flies the actions, which are without the Approach, stops within 1 m of the anchor."""
     paths = data.paths
@@ -208,7 +194,7 @@ def stops_far(data: SceneData, _rows: Rows) -> Iterator[Finding]:
 def _anchor_poses(data: SceneData, anchor_of_route: Ints) -> tuple[Mask, Floats]:
     """Which routes have a sound anchor, and every route's anchor's pose, (n, 4)."""
     poses = data["anchors"].floats(*POSE).reshape(-1, 4)
-    return comparable(data, "anchors", anchor_of_route), at(poses, anchor_of_route)
+    return data.comparable("anchors", anchor_of_route), at(poses, anchor_of_route)
 
 
 def _off(fit: Mask, own: Floats, wanted: Floats) -> Iterator[Finding]:

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.dataset.validate.registry import Finding, Function, check
-from aerialdojo_gen.dataset.validate.rows import MESH_CHECKS, Floats, Rows, SceneData, UncheckedError
+from aerialdojo_gen.dataset.validate.rows import MESH_CHECKS, Floats, Rows, SceneData, UncheckedError, place_text
 
 _SAME = 1e-6
 # glTF's y is up, the world's z is: what a node's own coordinates become, and nothing else.
@@ -42,7 +42,7 @@ def _whole(function: Function) -> Function:
     return run
 
 
-@check("scenes", needs=("mesh",), after=MESH_CHECKS)
+@check("scenes", after=MESH_CHECKS)
 @_whole
 def mesh_moved(data: SceneData, _rows: Rows) -> Iterator[Finding]:
     """By glTF's rules every node stands where its vertices say: nothing above it moves, turns or scales it."""
@@ -68,7 +68,7 @@ def mesh_moved(data: SceneData, _rows: Rows) -> Iterator[Finding]:
         yield Finding(0, f"{len(odd):,} nodes that a viewer shows otherwise, {odd[0]} first", "each node once")
 
 
-@check("scenes", needs=("mesh",), after=MESH_CHECKS)
+@check("scenes", after=MESH_CHECKS)
 @_whole
 def mesh_colours(data: SceneData, _rows: Rows) -> Iterator[Finding]:
     """A material's colour is the same by its name, by its extras, by its factor and by its texture."""
@@ -95,7 +95,7 @@ def mesh_colours(data: SceneData, _rows: Rows) -> Iterator[Finding]:
             return
 
 
-@check("scenes", needs=("mesh",), after=MESH_CHECKS)
+@check("scenes", after=MESH_CHECKS)
 @_whole
 def mesh_extent(data: SceneData, _rows: Rows) -> Iterator[Finding]:
     """Vertices are finite and lie within the bounds that the file tells of them; nothing of it lies elsewhere."""
@@ -115,24 +115,24 @@ def mesh_extent(data: SceneData, _rows: Rows) -> Iterator[Finding]:
             low, high = part.vertices.min(axis=0), part.vertices.max(axis=0)
             off = (np.abs(own - accessor.get(name, np.nan)).max() for own, name in ((low, "min"), (high, "max")))
             if not max(off) <= _SAME * max(1.0, float(np.abs([low, high]).max())):
-                found = f"node {node['name']} from {_triple(low)} to {_triple(high)}"
-                stated = f"{_triple(accessor.get('min', ()))} to {_triple(accessor.get('max', ()))} m as told"
-                yield Finding(0, found, stated)
+                found = f"node {node['name']} from {place_text(low, 4)} to {place_text(high, 4)}"
+                stated = (place_text(np.asarray(accessor.get(name, ())), 4) for name in ("min", "max"))
+                yield Finding(0, found, f"{' to '.join(stated)}, as the file has it")
                 return
 
 
 def _document(data: SceneData) -> dict[str, Any]:
     """Return the glTF document, read once, of a mesh that can be read."""
     _ = data.mesh
-    document = data.cached("gltf", lambda: _parse(data.mesh_path().read_bytes()))
+
+    def parse() -> Any:
+        raw = data.mesh_path().read_bytes()
+        return json.loads(raw[20 : 20 + struct.unpack_from("<I", raw, 12)[0]])
+
+    document = data.cached("gltf", parse)
     if not isinstance(document, dict):
         raise UncheckedError("no glTF document")
     return document
-
-
-def _parse(raw: bytes) -> Any:
-    (length,) = struct.unpack_from("<I", raw, 12)
-    return json.loads(raw[20 : 20 + length])
 
 
 def _placed(document: dict[str, Any]) -> Iterator[tuple[dict[str, Any], Floats]]:
@@ -169,7 +169,7 @@ def _describe(world: Floats) -> str:
     """Describe how a transform differs from the expected one, in the world frame."""
     rest = np.linalg.inv(_UP) @ world
     if np.abs(rest[:3, :3] - np.eye(3)).max() <= _SAME:
-        return f"{_triple(rest[:3, 3])} m"
+        return place_text(rest[:3, 3], 4)
     return f"a turn or a scale, {np.round(rest[:3, :3], 4).tolist()}"
 
 
@@ -181,7 +181,3 @@ def _linear(srgb: Floats) -> Floats:
 
 def _rgb(colour: NDArray[Any] | tuple[int, int, int]) -> str:
     return "#" + "".join(f"{round(float(c)):02x}" for c in colour)
-
-
-def _triple(v: Any) -> str:
-    return "(" + ", ".join(f"{x:.4f}" for x in v) + ")"

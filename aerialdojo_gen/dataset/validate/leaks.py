@@ -12,22 +12,13 @@ import hashlib
 import re
 import zlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import partial
 
 import numpy as np
 
 from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.dataset.validate.registry import Finding, check
-from aerialdojo_gen.dataset.validate.rows import (
-    START,
-    Ints,
-    Rows,
-    SceneData,
-    Texts,
-    UncheckedError,
-    at,
-    pairs_of,
-    repeated,
-)
+from aerialdojo_gen.dataset.validate.rows import START, Ints, Rows, SceneData, Texts, UncheckedError, at, repeated
 from aerialdojo_gen.pipeline.stages.work.split import key_of, nav_id, reference_id
 
 _SAME_M = 1e-9
@@ -68,7 +59,7 @@ def telling_id(data: SceneData, rows: Rows) -> Iterator[Finding]:
             yield Finding(row, f"reference_image_id = {image!r}", "ref_<12 hexadecimal digits>")
 
 
-@check("tasks", needs=("objects",))
+@check("tasks")
 def telling_text(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """Names and descriptions hold no coordinate and no node of the mesh."""
     nodes = {node for node in data["objects"].texts("mesh_node") if node and re.search(r"_\d+$", node)}
@@ -83,7 +74,7 @@ def telling_text(data: SceneData, rows: Rows) -> Iterator[Finding]:
                 yield Finding(row, f"{name} tells {judged[text]!r}", "words alone")
 
 
-@check("tasks", needs=("routes", "objects"))
+@check("tasks")
 def telling_number(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """No number of a task's row is a coordinate of its goal or of its target, unless the start shares it."""
     goals = data["routes"].floats("goal_x_m", "goal_y_m", "goal_z_m").reshape(-1, 3)
@@ -100,7 +91,7 @@ def telling_number(data: SceneData, rows: Rows) -> Iterator[Finding]:
 @check("routes", after=("duplicate_key", "route_in_both_subsets"))
 def duplicate_route(_data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A start anchor and a target make one navigation task."""
-    pairs, nav_ids = pairs_of(rows), rows.texts("nav_id")
+    pairs, nav_ids = rows.pairs(), rows.texts("nav_id")
     for row, first in repeated(pairs):
         yield Finding(row, f"start and target {pairs[row]} as {nav_ids[first]}", "each pair once")
 
@@ -108,7 +99,7 @@ def duplicate_route(_data: SceneData, rows: Rows) -> Iterator[Finding]:
 @check("routes", after=("duplicate_key", "unknown_target", "unknown_start"))
 def nav_id_guessed(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A nav_id is no hash of its start and target that anybody could compute."""
-    for row, (pair, digits) in enumerate(zip(pairs_of(rows), _digits(data, rows), strict=True)):
+    for row, (pair, digits) in enumerate(zip(rows.pairs(), _digits(data, rows), strict=True)):
         if _guessed(data.scene, pair, digits):
             yield Finding(row, f"…-{digits}, a plain hash of the pair {pair}", "a hash with a key")
 
@@ -127,7 +118,7 @@ def image_id_guessed(data: SceneData, rows: Rows) -> Iterator[Finding]:
 def nav_id_of_salt(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A nav_id is what the pipeline's salt makes of its start and target."""
     key = key_of(data.pipeline.split.salt, data.pipeline.seed)
-    yield from _unlike(rows.texts("nav_id"), [nav_id(data.scene, pair, key) for pair in pairs_of(rows)])
+    yield from _unlike(rows.texts("nav_id"), [nav_id(data.scene, pair, key) for pair in rows.pairs()])
 
 
 @check("objects", after=("image_id_guessed", "image_id_twice"))
@@ -138,12 +129,11 @@ def image_id_of_salt(data: SceneData, rows: Rows) -> Iterator[Finding]:
     yield from _unlike(rows.texts("reference_image_id"), expected)
 
 
-@check("routes", needs=("objects",), after=("duplicate_key", "unknown_target", "nav_id_guessed", "nav_id_of_salt"))
+@check("routes", after=("duplicate_key", "unknown_target", "nav_id_guessed", "nav_id_of_salt"))
 def telling_digits(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """Digits and order of nav_ids are independent of target, start, landmark, direction, category and length."""
-    odd = data.flagged("routes", ("duplicate_key", "unknown_target"))
-    fit = np.flatnonzero(~odd)
-    digits = [text for k, text in enumerate(_digits(data, rows)) if not odd[k]]
+    fit = np.flatnonzero(rows.judged)
+    digits = np.array(_digits(data, rows))[fit].tolist()
     if len(fit) < _FEW:
         raise UncheckedError(f"fewer than {_FEW} ids")
     objects, target = data["objects"], data.target_of_route[fit]
@@ -158,15 +148,15 @@ def telling_digits(data: SceneData, rows: Rows) -> Iterator[Finding]:
     backwards = np.argsort(np.array([text[::-1] for text in digits]), kind="stable")
     parts = {f"digit {k + 1}": _codes([text[k : k + 1] for text in digits]) for k in range(_DIGITS)}
     parts |= {f"digits {k + 1} and {k + 2}": _codes([text[k : k + 2] for text in digits]) for k in (0, _DIGITS - 2)}
+    tests = {words: partial(_shared, part) for words, part in parts.items()}
+    tests |= {"order": partial(_neighbours, order), "order from the end": partial(_neighbours, backwards)}
     for name, secret in secrets.items():
-        tests = {words: _shared(part, secret) for words, part in parts.items()}
-        tests |= {"order": _neighbours(order, secret), "order from the end": _neighbours(backwards, secret)}
         for words, statistic in tests.items():
             rng = generator(0, "validate", data.scene, name, words)
-            drawn = [statistic(rng.permutation(len(secret))) for _ in range(_DRAWINGS)]
+            drawn = [statistic(secret[rng.permutation(len(secret))]) for _ in range(_DRAWINGS)]
             # Counts that hardly vary by chance are given the deviation of a count.
             deviation = max(float(np.std(drawn)), float(np.sqrt(np.mean(drawn))), 1.0)
-            off = (statistic(np.arange(len(secret))) - float(np.mean(drawn))) / deviation
+            off = (statistic(secret) - float(np.mean(drawn))) / deviation
             if off > _DEVIATIONS:
                 found = f"nav_ids whose {words} goes with {name}, {off:.0f} standard deviations above chance"
                 yield Finding(int(fit[0]), found, f"{_DEVIATIONS:g} at most, as of digits that were drawn")
@@ -197,22 +187,12 @@ def _codes(values: Iterable[object]) -> Ints:
     return np.array([known.setdefault(value, len(known)) for value in values], dtype=np.int64)
 
 
-def _shared(part: Ints, secret: Ints) -> Callable[[Ints], float]:
-    """Pairs of rows that share both a part of their ids and a secret, by how the secrets are dealt out."""
-    width = int(secret.max(initial=0)) + 1
-
-    def count(dealt: Ints) -> float:
-        cells = np.bincount(part * width + secret[dealt]).astype(np.float64)
-        return float((cells * (cells - 1)).sum() / 2)
-
-    return count
+def _shared(part: Ints, secret: Ints) -> float:
+    """Pairs of rows that share both a part of their ids and a secret."""
+    cells = np.bincount(part * (int(secret.max(initial=0)) + 1) + secret).astype(np.float64)
+    return float((cells * (cells - 1)).sum() / 2)
 
 
-def _neighbours(order: Ints, secret: Ints) -> Callable[[Ints], float]:
-    """Ids next to each other in their order that share a secret, by how the secrets are dealt out."""
-
-    def count(dealt: Ints) -> float:
-        sorted_secrets = secret[dealt][order]
-        return float((sorted_secrets[1:] == sorted_secrets[:-1]).sum())
-
-    return count
+def _neighbours(order: Ints, secret: Ints) -> float:
+    """Ids next to each other in their order that share a secret."""
+    return float((np.diff(secret[order]) == 0).sum())

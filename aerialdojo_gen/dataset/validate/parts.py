@@ -49,10 +49,6 @@ class Release:
         """Return the name of a file of the release, relative to the root."""
         return f"{self.folder}/{relative}" if self.folder else relative
 
-    def at(self, relative: str) -> str:
-        """Return where a file of the release lies, for messages."""
-        return self.root.at(self.name(relative))
-
 
 def release_of(where: Release | Where) -> Release:
     """Find the release in a data root; a release by itself, with or without meshes beside it, is one too."""
@@ -68,33 +64,22 @@ def release_of(where: Release | Where) -> Release:
     return Release(open_root(above or "/"), name)
 
 
-def part_path(key: str, scene: str) -> str:
-    """Return where a scene's part lies, relative to the release."""
-    return part_name(key, scene, "")
-
-
 def foreign_files(release: Release, scenes: list[str]) -> Outcome:
     """Find what does not belong: no part of a scene, no card."""
-    expected = {part_path(key, scene) for keys in release_tables().values() for key in keys for scene in scenes}
+    expected = {part_name(key, scene, "") for keys in release_tables().values() for key in keys for scene in scenes}
     outcome = Outcome("foreign_file", "files")
     names = release.root.list(release.folder, "**/*")
     folders = {str(parent) for name in names for parent in PurePosixPath(name).parents}
     for name in names:
-        if name in folders or _is_empty_folder(release.root, name):
+        # An object store has no empty folders.
+        path = release.root.path / name if isinstance(release.root, LocalRoot) else None
+        if name in folders or (path is not None and path.is_dir() and not path.is_symlink()):
             continue
         outcome.rows += 1
         relative = PurePosixPath(name).relative_to(release.folder)
         if relative.as_posix() not in expected and relative.parts[0] not in _OTHER_FILES:
             outcome.fault("a file that is no part of a release", "none", part=relative.as_posix())
     return outcome
-
-
-def _is_empty_folder(root: DataRoot, name: str) -> bool:
-    """Whether it is a folder without anything in it, which only a file system has."""
-    if not isinstance(root, LocalRoot):
-        return False
-    path = root.path / name
-    return path.is_dir() and not path.is_symlink()
 
 
 def read_tables(release: Release, scene: str) -> tuple[dict[str, Rows], list[Outcome]]:
@@ -108,9 +93,14 @@ def read_tables(release: Release, scene: str) -> tuple[dict[str, Rows], list[Out
         if len(whole) < len(parts):
             continue
         ends = tuple(accumulate(part.num_rows for part in whole))
-        paths = tuple(part_path(key, scene) for key in keys)
+        paths = tuple(part_name(key, scene, "") for key in keys)
         tables[name] = Rows(name, store.LAYOUT[keys[0]].spec, pa.concat_tables(whole), paths, ends)
-    _one_run(scene, runs, found["part_of_other_run"])
+    found["part_of_other_run"].rows = len(runs)
+    # Parts whose fingerprint is not that of most of the scene's parts.
+    for fingerprint, _ in Counter(runs.values()).most_common()[1:]:
+        for part in (part for part, own in runs.items() if own == fingerprint):
+            written = f"written by run {fingerprint[:12] or '(none)'}"
+            found["part_of_other_run"].fault(written, "the run of the scene's other parts", scene=scene, part=part)
     return tables, list(found.values())
 
 
@@ -127,8 +117,8 @@ PART_CHECKS = {
 
 def _read(release: Release, key: str, scene: str, found: dict[str, Outcome], runs: dict[str, str]) -> pa.Table | None:
     spec = store.LAYOUT[key].spec
-    relative = part_path(key, scene)
-    name, where = release.name(relative), release.at(relative)
+    relative = part_name(key, scene, "")
+    name = release.name(relative)
 
     def fault(check: str, what: str, expected: str) -> None:
         found[check].fault(what, expected, scene=scene, table=spec.name, part=relative)
@@ -143,9 +133,10 @@ def _read(release: Release, key: str, scene: str, found: dict[str, Outcome], run
         return None
     found["part_damaged"].rows += 1
     try:
-        table, info = read_file(path, None, where), store.read_info(release.root, name)
+        table, info = read_file(path, None, release.root.at(name)), store.read_info(release.root, name)
     except DamagedFile as error:
-        fault("part_damaged", str(error).removeprefix(f"{where} ").split(": delete")[0], "a whole Parquet file")
+        what = str(error).removeprefix(f"{release.root.at(name)} ").split(": delete")[0]
+        fault("part_damaged", what, "a whole Parquet file")
         return None
     found["part_schema"].rows += 1
     runs[relative] = info.fingerprint
@@ -166,15 +157,6 @@ def _read(release: Release, key: str, scene: str, found: dict[str, Outcome], run
         fault("part_rows", f"{table.num_rows} rows", "one row" if key == "release/scenes" else "at least one")
         return None
     return table.replace_schema_metadata(None).cast(pa.schema([pa.field(f.name, f.type) for f in spec.schema]))
-
-
-def _one_run(scene: str, runs: dict[str, str], outcome: Outcome) -> None:
-    """Name the parts whose fingerprint is not that of most of the scene's parts."""
-    outcome.rows = len(runs)
-    for fingerprint, _ in Counter(runs.values()).most_common()[1:]:
-        for part in (part for part, own in runs.items() if own == fingerprint):
-            written = f"written by run {fingerprint[:12] or '(none)'}"
-            outcome.fault(written, "the run of the scene's other parts", scene=scene, part=part)
 
 
 def _schema_faults(spec: TableSpec, table: pa.Table, extra: list[str]) -> Iterator[str]:

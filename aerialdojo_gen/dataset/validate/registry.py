@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -45,9 +45,7 @@ class Check:
 
     name: str  # Stable name; reports and tests go by it
     table: str  # The table whose rows it checks; ``"*"`` for every table
-    needs: tuple[str, ...]  # Other tables that it reads; ``"mesh"`` is the scene's mesh
     after: tuple[str, ...]  # Checks of the same table that run before; rows that fail them are skipped
-    about: str  # The rule
     run: Function  # Yields the rows at fault
     samples: bool = False
 
@@ -73,14 +71,11 @@ class Outcome:
 CHECKS: list[Check] = []
 
 
-def check(
-    table: str, *, needs: tuple[str, ...] = (), after: tuple[str, ...] = (), samples: bool = False
-) -> Callable[[Function], Function]:
+def check(table: str, *, after: tuple[str, ...] = (), samples: bool = False) -> Callable[[Function], Function]:
     """Register a function as a check: its name is the check's name, its docstring the rule."""
 
     def register(function: Function) -> Function:
-        about = (function.__doc__ or "").strip().splitlines()[0]
-        CHECKS.append(Check(function.__name__, table, needs, after, about, function, samples))
+        CHECKS.append(Check(function.__name__, table, after, function, samples))
         return function
 
     return register
@@ -113,12 +108,9 @@ def run_checks(data: SceneData, checks: Iterable[Check]) -> Iterator[Outcome]:
 
 
 def _run(data: SceneData, one: Check, table: str) -> Outcome:
-    missing = [name for name in (table, *one.needs) if name != "mesh" and name not in data.tables]
-    if missing:
-        return Outcome(one.name, table, skipped=f"{missing[0]} cannot be read")
-    rows = data[table]
-    left_out = data.flagged(table, (*(n for n in ALWAYS_AFTER if n != one.name), *one.after))
     try:
+        left_out = data.flagged(table, (*(n for n in ALWAYS_AFTER if n != one.name), *one.after))
+        rows = replace(data[table], left_out=left_out)
         findings = [f for f in one.run(data, rows) if not left_out[f.row]]
     except UncheckedError as reason:
         return Outcome(one.name, table, skipped=str(reason))
@@ -129,10 +121,8 @@ def _run(data: SceneData, one: Check, table: str) -> Outcome:
     mask = np.zeros(len(rows), dtype=np.bool_)
     mask[[f.row for f in findings if not f.warning]] = True
     data.faulty[table, one.name] = mask
-    faults: dict[bool, list[Fault]] = {False: [], True: []}
+    outcome = Outcome(one.name, table, len(data.sampled(rows)) if one.samples else int(rows.judged.sum()))
     for f in findings:
         fault = Fault(one.name, data.scene, table, rows.part(f.row), rows.key(f.row), f.found, f.expected)
-        faults[f.warning].append(fault)
-    sampled = slice(None) if not one.samples else data.sampled if table == "routes" else data.sampled_objects
-    judged = ~left_out[sampled]
-    return Outcome(one.name, table, int(judged.sum()), faults[False], warnings=faults[True])
+        (outcome.warnings if f.warning else outcome.faults).append(fault)
+    return outcome

@@ -6,7 +6,7 @@ import csv
 import json
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -19,17 +19,6 @@ from aerialdojo_gen.store.atomic import atomic_file
 from aerialdojo_gen.store.parquet_files import write_file
 
 FORMATS = (".jsonl", ".json", ".csv", ".parquet")
-
-
-@dataclass
-class CheckTotal:
-    """A check summed up over scenes: its tables, rows judged, faults, and how often it was not made, by reason."""
-
-    check: str
-    tables: dict[str, None] = field(default_factory=dict)
-    judged: int = 0
-    faults: int = 0
-    not_made: Counter[str] = field(default_factory=Counter)
 
 
 @dataclass(frozen=True)
@@ -49,34 +38,30 @@ class Report:
         """Every reported row that is no fault."""
         return [warning for outcome in self.outcomes for warning in outcome.warnings]
 
-    def totals(self) -> list[CheckTotal]:
-        """Sum up over scenes and tables, in the order of the checks."""
-        totals: dict[str, CheckTotal] = {}
+    def by_check(self) -> dict[str, list[Outcome]]:
+        """Outcomes on scenes and tables by the name of their check, in the order of the checks."""
+        found: dict[str, list[Outcome]] = {}
         for outcome in self.outcomes:
-            total = totals.setdefault(outcome.check, CheckTotal(outcome.check))
-            total.tables[outcome.table] = None
-            total.judged += outcome.rows
-            total.faults += len(outcome.faults)
-            if outcome.skipped:
-                total.not_made[outcome.skipped] += 1
-        return list(totals.values())
+            found.setdefault(outcome.check, []).append(outcome)
+        return found
 
     def table_lines(self, width: int | None = None, *, verbose: bool = False) -> list[str]:
         """Write a line per table, or per check: rows checked, faults, what was not checked and why."""
-        groups: dict[str, list[CheckTotal]] = {}
-        for total in self.totals():
-            of = next(iter(total.tables)) if len(total.tables) == 1 else "every table"
-            groups.setdefault(of, []).append(total)
+        groups: dict[str, list[list[Outcome]]] = {}
+        for outcomes in self.by_check().values():
+            of = outcomes[0].table if len({outcome.table for outcome in outcomes}) == 1 else "every table"
+            groups.setdefault(of, []).append(outcomes)
         rows = []
-        for of, totals in groups.items():
-            for part in [[total] for total in totals] if verbose else [totals]:
-                skipped = sum((total.not_made for total in part), Counter[str]())
+        for of, checks in groups.items():
+            for part in [[own] for own in checks] if verbose else [checks]:
+                skipped = Counter(outcome.skipped for own in part for outcome in own if outcome.skipped)
                 why = "; ".join(f"{why}{f' ({n} times)' if n > 1 else ''}" for why, n in skipped.items())
-                judged, faults = max(total.judged for total in part), sum(total.faults for total in part)
-                first, second = (part[0].check, of) if verbose else (of, f"{len(part)}")
+                judged = max(sum(outcome.rows for outcome in own) for own in part)
+                faults = sum(len(outcome.faults) for own in part for outcome in own)
+                first, second = (part[0][0].check, of) if verbose else (of, f"{len(part)}")
                 rows.append((first, [second, f"{judged:,}", f"{faults:,}", why]))
         columns = [Column("table", words=True) if verbose else Column("checks"), Column("rows"), Column("faults")]
-        if any(total.not_made for total in self.totals()):
+        if any(outcome.skipped for outcome in self.outcomes):
             columns.append(Column("not checked", words=True))
         return TextTable("check" if verbose else "table", columns, rows).lines(width)
 
@@ -97,7 +82,16 @@ class Report:
 
     def as_json(self) -> dict[str, Any]:
         """Return all of it as plain values: verdict, scenes, checks with their counts, every fault and warning."""
-        checks = [vars(total) | {"tables": [*total.tables]} for total in self.totals()]
+        checks = [
+            {
+                "check": name,
+                "tables": [*dict.fromkeys(outcome.table for outcome in own)],
+                "judged": sum(outcome.rows for outcome in own),
+                "faults": sum(len(outcome.faults) for outcome in own),
+                "not_made": Counter(outcome.skipped for outcome in own if outcome.skipped),
+            }
+            for name, own in self.by_check().items()
+        ]
         faults, warnings = ([one._asdict() for one in found] for found in (self.faults, self.warnings))
         return {
             "verdict": self.verdict(), "scenes": [*self.scenes], "checks": checks, "faults": faults,
@@ -106,10 +100,10 @@ class Report:
 
     def verdict(self) -> str:
         """One line: what was checked, and whether all was well."""
-        totals, faults, n = self.totals(), len(self.faults), len(self.scenes)
-        judged = sum(total.judged for total in totals)
-        undone = sum(bool(total.not_made) for total in totals)
-        what = f"{len(totals)} checks, {judged:,} rows judged, {n} scene{'s' if n != 1 else ''}"
+        checks, faults, n = self.by_check().values(), len(self.faults), len(self.scenes)
+        judged = sum(outcome.rows for outcome in self.outcomes)
+        undone = sum(any(outcome.skipped for outcome in own) for own in checks)
+        what = f"{len(checks)} checks, {judged:,} rows judged, {n} scene{'s' if n != 1 else ''}"
         rest = f"; {undone} checks were not made everywhere" if undone else ""
         rest += f"; {len(self.warnings):,} warnings" if self.warnings else ""
         return f"{what}: {f'{faults:,} at fault' if faults else 'no fault'}{rest}"

@@ -13,6 +13,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import ArrayLike, NDArray
 
+from aerialdojo_gen.base.cached import cached_method
 from aerialdojo_gen.base.config.pipeline import Pipeline
 from aerialdojo_gen.base.rng import rank
 from aerialdojo_gen.geometry.rays import RayCaster
@@ -56,10 +57,16 @@ class Rows:
     table: pa.Table  # The rows, parts one after the other
     parts: tuple[str, ...]  # Paths of the parts, relative to the release
     ends: tuple[int, ...]  # Row after the last one of each part
+    left_out: Mask | None = None  # Rows that a check passes over, for others found fault with them; None for none
 
     def __len__(self) -> int:
         """Count the rows."""
         return int(self.table.num_rows)
+
+    @property
+    def judged(self) -> Mask:
+        """Rows that a check judges, (n,) bool."""
+        return np.ones(len(self), dtype=np.bool_) if self.left_out is None else ~self.left_out
 
     @cached_property
     def part_of(self) -> Ints:
@@ -106,6 +113,16 @@ class Rows:
         found = pc.index_in(keys, value_set=self.column(name))
         return pc.fill_null(found, -1).to_numpy(zero_copy_only=False).astype(np.int64)
 
+    def pairs(self) -> list[str]:
+        """Start anchor and target of every route, as ids are made from them."""
+        columns = (self.ints(name).tolist() for name in ("start_object_id", "start_anchor_id", "target_object_id"))
+        return [f"{start}_{anchor}__{target}" for start, anchor, target in zip(*columns, strict=True)]
+
+    def list_lengths(self) -> Ints:
+        """Count the elements of the five lists of every route, (n, 5) int64; a null list has none."""
+        counts = [pc.fill_null(pc.list_value_length(self.column(name)), 0) for name in LISTS]
+        return np.column_stack([np.asarray(c.to_numpy(zero_copy_only=False), dtype=np.int64) for c in counts])
+
 
 def pose_text(pose: ArrayLike) -> str:
     """Write a pose, x, y, z in metres and yaw in radians."""
@@ -122,12 +139,6 @@ def at(values: NDArray[Any], rows: Ints) -> NDArray[Any]:
     """Values at rows; NaN, or -1 of whole numbers, where a row is -1."""
     gap = np.full((1, *values.shape[1:]), np.nan if values.dtype.kind == "f" else -1)
     return np.concatenate([values, gap])[rows]
-
-
-def pairs_of(routes: Rows) -> list[str]:
-    """Start anchor and target of every route, as ids are made from them."""
-    columns = (routes.ints(name).tolist() for name in ("start_object_id", "start_anchor_id", "target_object_id"))
-    return [f"{start}_{anchor}__{target}" for start, anchor, target in zip(*columns, strict=True)]
 
 
 def repeated(keys: Iterable[Hashable]) -> Iterator[tuple[int, int]]:
@@ -153,9 +164,13 @@ class Paths:
 
     fit: Mask  # (n,); whether a route has lists of one length, of two poses or more
     first: Ints  # (n + 1,) int64; where each route's poses begin
-    xyz: Floats  # (m, 3) float64; positions, world frame
-    yaw: Floats  # (m,) float64
+    pose: Floats  # (m, 4) float64; positions, world frame, and yaw
     action: Ints  # (m,) int64; what is done at every pose
+
+    @cached_property
+    def xyz(self) -> Floats:
+        """Positions, (m, 3) float64."""
+        return np.ascontiguousarray(self.pose[:, :3])
 
     def of(self, row: int) -> slice:
         """Where a route's poses lie."""
@@ -163,7 +178,7 @@ class Paths:
 
     def poses(self, row: int) -> Floats:
         """Poses of a route, (k, 4) float64."""
-        return np.column_stack([self.xyz[self.of(row)], self.yaw[self.of(row)]])
+        return self.pose[self.of(row)]
 
     def route_of(self, poses: Ints) -> Ints:
         """Rows of the routes that poses belong to."""
@@ -178,14 +193,12 @@ class Paths:
     @cached_property
     def starts(self) -> Floats:
         """First poses, (n, 4) float64."""
-        first = self.first[:-1][self.fit]
-        return self._spread(np.column_stack([self.xyz[first], self.yaw[first]]))
+        return self._spread(self.pose[self.first[:-1][self.fit]])
 
     @cached_property
     def ends(self) -> Floats:
         """Last poses, (n, 4) float64."""
-        last = self.first[1:][self.fit] - 1
-        return self._spread(np.column_stack([self.xyz[last], self.yaw[last]]))
+        return self._spread(self.pose[self.first[1:][self.fit] - 1])
 
     def sums(self, values: Floats) -> Floats:
         """Add up what each pose has, (m,), by route, (n,)."""
@@ -205,27 +218,6 @@ class Paths:
         return np.asarray(np.linalg.norm(self.ends[:, :3] - self.starts[:, :3], axis=1))
 
 
-def list_lengths(routes: Rows) -> Ints:
-    """Count the elements of the five lists, (n, 5) int64; a null list has none."""
-    counts = [pc.fill_null(pc.list_value_length(routes.column(name)), 0) for name in LISTS]
-    return np.column_stack([np.asarray(c.to_numpy(zero_copy_only=False), dtype=np.int64) for c in counts])
-
-
-def paths_of(routes: Rows) -> Paths:
-    """Lay out the poses of a scene's routes."""
-    lengths = list_lengths(routes)
-    fit = (lengths == lengths[:, :1]).all(axis=1) & (lengths[:, 0] >= 2)
-    table = routes.table.filter(pa.array(fit)) if not fit.all() else routes.table
-    flat = {}
-    for name in LISTS:
-        values = pc.list_flatten(table.column(name))
-        flat[name] = values.to_numpy(zero_copy_only=False) if len(values) else np.empty(0)
-    first = np.concatenate([[0], np.cumsum(np.where(fit, lengths[:, 0], 0))]).astype(np.int64)
-    xyz = np.column_stack([flat[name] for name in LISTS[:3]]).astype(np.float64)
-    action = np.nan_to_num(flat["action"], nan=-1).astype(np.int64)
-    return Paths(fit, first, xyz, flat["yaw_rad"].astype(np.float64), action)
-
-
 @dataclass(eq=False)
 class SceneData:
     """One scene of a release, as the checks get it."""
@@ -242,21 +234,35 @@ class SceneData:
     cache: dict[str, Any] = field(default_factory=dict)
 
     def __getitem__(self, name: str) -> Rows:
-        """Return a table's rows."""
+        """Return a table's rows; `UncheckedError` where they cannot be read."""
+        if name not in self.tables:
+            raise UncheckedError(f"{name} cannot be read")
         return self.tables[name]
 
     @cached_property
     def paths(self) -> Paths:
         """Poses of the routes."""
-        return paths_of(self.tables["routes"])
+        lengths = self["routes"].list_lengths()
+        fit = (lengths == lengths[:, :1]).all(axis=1) & (lengths[:, 0] >= 2)
+        table = self["routes"].table.filter(pa.array(fit))
+        lists = [pc.list_flatten(table.column(name)) for name in LISTS]
+        *pose, action = (part.to_numpy(zero_copy_only=False) if len(part) else np.empty(0) for part in lists)
+        first = np.concatenate([[0], np.cumsum(np.where(fit, lengths[:, 0], 0))]).astype(np.int64)
+        actions = np.nan_to_num(action, nan=-1).astype(np.int64)
+        return Paths(fit, first, np.column_stack(pose).astype(np.float64), actions)
 
     def flagged(self, table: str, checks: Sequence[str]) -> Mask:
         """Rows of a table that one of these checks found fault with, (n,) bool."""
-        mask = np.zeros(len(self.tables[table]), dtype=np.bool_)
+        mask = np.zeros(len(self[table]), dtype=np.bool_)
         for name in checks:
             if (table, name) in self.faulty:
                 mask |= self.faulty[table, name]
         return mask
+
+    def comparable(self, table: str, rows: Ints) -> Mask:
+        """Whether looked-up rows of a table exist and are fit to compare with, (n,) bool."""
+        good = ~self.flagged(table, (*ALWAYS_AFTER, "duplicate_key"))
+        return (rows >= 0) & np.append(good, False)[rows]
 
     def cached(self, name: str, make: Callable[[], T]) -> T:
         """Return what one check has made for all others, made now where none has."""
@@ -265,30 +271,34 @@ class SceneData:
         value: T = self.cache[name]
         return value
 
-    def require_meshes(self) -> None:
-        """Raise `UncheckedError` where meshes are to be left alone, or the scene's row is not one row."""
-        if not self.use_meshes:
-            raise UncheckedError("--no-meshes was given")
-        if "scenes" not in self.tables or len(self["scenes"]) != 1:
+    @property
+    def scene_row(self) -> dict[str, Any]:
+        """The row of `scenes`; `UncheckedError` where it is not one row, or at fault."""
+        if len(self["scenes"]) != 1:
             raise UncheckedError("scenes has not one row of it")
         if self.flagged("scenes", ALWAYS_AFTER).any():
             raise UncheckedError("the scene's row is at fault")
+        return dict(self["scenes"].table.to_pylist()[0])
+
+    def stored_mesh(self) -> str:
+        """Return where the scene's mesh is said to lie; `UncheckedError` where meshes are to be left alone."""
+        if not self.use_meshes:
+            raise UncheckedError("--no-meshes was given")
+        return str(self.scene_row["mesh_path"])
 
     def mesh_path(self) -> Path:
         """Return the scene's mesh on this machine; FileNotFoundError where it is not there."""
-        stored_path = str(self["scenes"].texts("mesh_path")[0])
         if self.meshes is None:
-            return self.release.root.local_copy(stored_path)
-        return LocalRoot(self.meshes).local_copy(Path(stored_path).name)
+            return self.release.root.local_copy(self.stored_mesh())
+        return LocalRoot(self.meshes).local_copy(Path(self.stored_mesh()).name)
 
     @property
     def mesh(self) -> Scene:
         """The scene's mesh, read once; `UncheckedError` where there is none to check by."""
-        self.require_meshes()
+        self.stored_mesh()
         if self.flagged("scenes", MESH_CHECKS).any():
             raise UncheckedError("no mesh")
-        digest = str(self["scenes"].texts("mesh_sha256")[0])
-        return self.cached("mesh", lambda: open_scene(self.mesh_path(), digest).scene)
+        return self.cached("mesh", lambda: open_scene(self.mesh_path(), self.scene_row["mesh_sha256"]).scene)
 
     @property
     def world(self) -> CollisionWorld:
@@ -300,27 +310,21 @@ class SceneData:
         """The mesh for first hits."""
         return ray_caster(self.mesh)
 
-    def sampled_routes(self, *faults: str) -> Iterator[int]:
-        """Sampled routes without any of these faults."""
-        skip = self.flagged("routes", faults)
-        yield from (row for row in self.sampled.tolist() if not skip[row])
+    def sampled(self, rows: Rows) -> Ints:
+        """Judged rows to check at length, all or so many by a draw from ids: routes with FCL, objects' pictures."""
+        drawn = self._drawn(rows.name)
+        return drawn[rows.judged[drawn]]
 
-    @cached_property
-    def sampled(self) -> Ints:
-        """Routes that FCL checks: all whose lists fit together, or so many by a draw from their ids."""
-        rows = np.flatnonzero(self.paths.fit)
-        if self.sample is None or self.sample >= len(rows):
-            return rows
-        nav_ids = self["routes"].texts("nav_id")
-        order = sorted(rows.tolist(), key=lambda row: rank(0, "validate", nav_ids[row]))
-        return np.sort(np.array(order[: self.sample], dtype=np.int64))
-
-    @cached_property
-    def sampled_objects(self) -> Ints:
-        """Rows of `objects` whose pictures are rendered again: all, or so many by a draw from their ids."""
-        ids = self["objects"].ints("object_id").tolist()
-        order = sorted(range(len(ids)), key=lambda row: rank(0, "validate", self.scene, ids[row]))
-        return np.sort(np.array(order[: self.pictures], dtype=np.int64))
+    @cached_method
+    def _drawn(self, table: str) -> Ints:
+        keys: list[tuple[Any, ...]]
+        if table == "routes":
+            fit, most, keys = np.flatnonzero(self.paths.fit), self.sample, [(k,) for k in self[table].texts("nav_id")]
+        else:
+            keys = [(self.scene, k) for k in self[table].ints("object_id").tolist()]
+            fit, most = np.arange(len(keys)), self.pictures
+        order = sorted(fit.tolist(), key=lambda row: rank(0, "validate", *keys[row]))
+        return np.sort(np.array(order[:most], dtype=np.int64))
 
     @cached_property
     def route_of_task(self) -> Ints:

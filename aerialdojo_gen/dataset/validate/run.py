@@ -11,9 +11,9 @@ from pathlib import Path
 from aerialdojo_gen.base.config.pipeline import Pipeline
 from aerialdojo_gen.base.errors import AerialDojoError
 from aerialdojo_gen.base.names import choose_scenes
-from aerialdojo_gen.dataset.contents import release_scenes
+from aerialdojo_gen.dataset.contents import part_name, scenes_in_release
 from aerialdojo_gen.dataset.validate.counts import SceneCounts, count_scene, scene_counts, whole_counts
-from aerialdojo_gen.dataset.validate.parts import Release, foreign_files, part_path, read_tables, release_of
+from aerialdojo_gen.dataset.validate.parts import Release, foreign_files, read_tables, release_of
 from aerialdojo_gen.dataset.validate.registry import CHECKS, TABLES, Outcome, ordered, run_checks
 from aerialdojo_gen.dataset.validate.report import Report
 from aerialdojo_gen.dataset.validate.rows import SceneData
@@ -73,7 +73,7 @@ def validate(
     reporter = reporter or Reporter(quiet=True)
     release = release_of(options.release)
     options = replace(options, release=release)
-    every = release_scenes(release.root, release.folder)
+    every = scenes_in_release(release.root, folder=release.folder)
     chosen = choose_scenes(options.scenes, every)
     by_scene: dict[str, tuple[list[Outcome], SceneCounts]] = {}
     shared = on_disk(release.root, *([options.meshes] if options.meshes else []))
@@ -112,7 +112,7 @@ def _large_first(release: Release, scenes: Sequence[str]) -> list[str]:
     """Order scenes by size, the largest first, to balance the processes."""
 
     def size(scene: str) -> int:
-        names = [release.name(part_path(key, scene)) for key in ("routes/train", "routes/test")]
+        names = [part_name(key, scene, release.folder) for key in ("routes/train", "routes/test")]
         return sum(release.root.size(name) for name in names if release.root.exists(name))
 
     return sorted(scenes, key=lambda scene: (-size(scene), scene))

@@ -7,10 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from aerialdojo_gen.annotations.bearings import nearest_landmark
-from aerialdojo_gen.annotations.check import check_source
+from aerialdojo_gen.annotations.check import SourceCheck
 from aerialdojo_gen.annotations.format import Annotations, Object, format_annotations, parse_annotations
-from aerialdojo_gen.annotations.relations import SceneGeometry
+from aerialdojo_gen.annotations.relations import SceneGeometry, nearest_landmark
 from aerialdojo_gen.annotations.vocabulary import Vocabulary
 from aerialdojo_gen.imports.forms import is_unnamed
 from aerialdojo_gen.studio.annotate.document import called
@@ -24,14 +23,14 @@ class Describer:
 
     def __init__(self, vocabulary: Vocabulary, counts: tuple[int, int] | None) -> None:
         self._scene, self._vocabulary, self._counts = vocabulary.scene, vocabulary, counts
-        self._geometry = SceneGeometry(vocabulary.scene)  # caches results
+        self._geometry = SceneGeometry.of(vocabulary.scene)  # caches results
 
     def describe(self, annotations: Annotations) -> dict[str, Any]:
         """Describe all entries: ``landmarks``, ``objects`` (each with its ``faults``) and ``faults`` of the file."""
         source = parse_annotations(format_annotations(annotations))
         faults: dict[tuple[str, int], list[dict[str, str]]] = {}
         general = []
-        faulty = check_source(source, self._vocabulary, self._counts, self._geometry).faults
+        faulty = SourceCheck(source, self._vocabulary, self._counts).faults
         for fault in faulty:
             message = _MENTION.sub(lambda m: called(m[1], getattr(annotations, m[1])[int(m[2])]), fault.message)
             at = _PATH.match(fault.path)

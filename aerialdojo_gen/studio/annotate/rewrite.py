@@ -17,13 +17,12 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict
 
-from aerialdojo_gen.annotations.appearance import SHADES
 from aerialdojo_gen.annotations.check import description_faults
 from aerialdojo_gen.annotations.claims import Claim, SceneClaims
 from aerialdojo_gen.annotations.format import Object, parse_annotations, write_annotations
 from aerialdojo_gen.annotations.matching import Matcher
-from aerialdojo_gen.annotations.vocabulary import Vocabulary
-from aerialdojo_gen.annotations.words import LISTS
+from aerialdojo_gen.annotations.phrases import LISTS
+from aerialdojo_gen.annotations.vocabulary import SHADES, Vocabulary
 from aerialdojo_gen.base.constants import DIRECTIONS
 from aerialdojo_gen.base.errors import AgentUnavailable, AnnotationError, UsageError
 from aerialdojo_gen.base.safe_parse import read_toml

@@ -1,19 +1,20 @@
-"""Every sentence of the grammar, filled in: no slot left, English articles, one space, one full stop."""
+"""Words of the catalogue and sentences of the grammar: clean English that asserts no more than is checked."""
 
+import itertools
 import re
+from collections import defaultdict
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aerialdojo_gen.annotations.language.grammar import SLOTS, expand, frames
 from aerialdojo_gen.annotations.language.locations import Location, relation_phrases
-from aerialdojo_gen.annotations.language.nouns import Name, NounPhrase, name_of, noun_phrase
-from aerialdojo_gen.annotations.language.sentences import Content, compose
-from aerialdojo_gen.annotations.language.subject import Wording, phrase_of
+from aerialdojo_gen.annotations.language.nouns import Name, NounPhrase, Wording, name_of, noun_phrase, phrase_of
+from aerialdojo_gen.annotations.language.sentences import SLOTS, Content, compose, expand, frames
 from aerialdojo_gen.annotations.language.writer import LENGTHS
-from aerialdojo_gen.annotations.phrases import article
+from aerialdojo_gen.annotations.phrases import article, group_of, words_of
+from aerialdojo_gen.annotations.vocabulary import SHADES
 
 KINDS = {"terse": ("at", "ref"), "vague": ("at",), "normal": ("at", "ref", "at_with", "at_telling")}
 MORE = ("with", "telling", "at", "clause", "near")
@@ -121,3 +122,70 @@ def test_texts_say_what_they_are_asked_to(level, noun, adjectives, tail, verb, p
     for wording, _ in details:
         said = [*wording.details, *(clause[2:] for clause in wording.clauses)]
         assert any(words in text for words in said), (text, said)
+
+
+NUMBERS = dict(
+    zip(("two", "three", "four", "five", "six", "seven", "eight", "nine", "ten"), range(2, 11), strict=True)
+)
+# "Four axles" of eight wheels, "seven pairs" of fourteen skis.
+HALVES = ("axles", "pairs", "bogies", "sets")
+
+
+def nouns(catalogue, category):
+    words = words_of(category, catalogue[category].name, catalogue[category].kind)
+    wholes = [f"{whole} of {head}" for whole, head in itertools.product(words.collectives, words.plural_heads)]
+    return [noun.lower() for noun in (*words.nouns, *wholes)]
+
+
+def head_of(noun):
+    return re.split(r" (?:of|on|in|with|at|for|from|under|that|to|made|and) ", noun)[0]
+
+
+def test_every_category_has_synonyms_and_none_names_another_category(catalogue):
+    by_category = {category: nouns(catalogue, category) for category in catalogue}
+    spoken_of = [category for category in catalogue if catalogue[category].kind != "life"]
+    assert [category for category in spoken_of if len(by_category[category]) < 2] == []
+    names = {category: catalogue[category].name.lower() for category in catalogue}
+    # "Wall" would name a garden wall as well.
+    named = defaultdict(set)
+    for category in catalogue:
+        for name in (names[category], *by_category[category]):
+            words = name.split()
+            for k in range(len(words)):
+                named[" ".join(words[k:])].add(category)
+    faults = [
+        (category, noun, other) for category in catalogue for noun in by_category[category] for other in named[noun]
+        if names[category] != names[other]
+    ]  # fmt: skip
+    assert not faults, "\n".join(map(str, faults))
+
+
+def test_synonyms_are_singular_unless_a_group_goes_before(catalogue):
+    for category in catalogue:
+        words = words_of(category, catalogue[category].name, catalogue[category].kind)
+        for noun in words.nouns:
+            assert bool(group_of(head_of(noun))) == bool(words.group), (category, noun)
+        for noun in words.plural_heads:
+            assert group_of(head_of(noun)) or head_of(noun).split()[-1] in ("masonry", "straw"), (category, noun)
+
+
+def test_no_wording_of_a_look_says_a_colour_or_a_number_that_is_not_checked(catalogue):
+    faults = []
+    for category in catalogue.targets:
+        for look in catalogue[category].looks:
+            colours = {name for names in look.colour.values() for name in names}
+            materials = " ".join(name for names in look.material.values() for name in names)
+            counts = {n for least, most in look.count.values() for n in range(least, most + 1)}
+            for wording in (*look.wordings, *look.adjectives):
+                text = wording.replace("ice cream", "").lower()
+                words = re.findall(r"[a-z]+", text)
+                said = [w for w in words if w in SHADES and w[:4] not in materials]
+                faults += [(category, wording, word) for word in said if not SHADES[word] & colours]
+                if re.search(r"metre|times|layers|rows|storeys|high|tiers", text):
+                    continue
+                found = counts | ({n // 2 for n in counts} if set(words) & set(HALVES) else set())
+                numbers = {NUMBERS[w] for w in words if w in NUMBERS} | ({2} if " pair " in text else set())
+                faults += [
+                    (category, wording, n) for n in numbers - found - {n // 2 for n in found if "each" in text}
+                ]
+    assert not faults, "\n".join(map(str, faults))

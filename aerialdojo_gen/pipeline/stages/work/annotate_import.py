@@ -9,11 +9,9 @@ from typing import Any
 
 import pyarrow as pa
 
-from aerialdojo_gen.annotations.check import check_source
+from aerialdojo_gen.annotations.check import SourceCheck
 from aerialdojo_gen.annotations.claims import SceneClaims
-from aerialdojo_gen.annotations.format import Annotations, parse_annotations
-from aerialdojo_gen.annotations.positions import Fault
-from aerialdojo_gen.annotations.relations import SceneGeometry
+from aerialdojo_gen.annotations.format import Annotations, Fault, parse_annotations
 from aerialdojo_gen.annotations.vocabulary import Vocabulary
 from aerialdojo_gen.base.config.sections import AnnotateImportConfig
 from aerialdojo_gen.base.errors import AnnotationError, UsageError
@@ -35,7 +33,7 @@ def run(job: Job, config: AnnotateImportConfig) -> Output:
     source = parse_annotations(text)
     vocabulary = Vocabulary.of(job.scene_model(), load_catalogue(job.roots.scene_assets))
     counts = paper_counts().get(job.scene) if config.paper_counts else None
-    checked = check_source(source, vocabulary, counts, SceneGeometry.of(vocabulary.scene))
+    checked = SourceCheck(source, vocabulary, counts)
     if checked.faults or checked.claims is None:
         raise AnnotationError(_report(path, checked.faults))
     tables = annotation_tables(source.annotations, checked.claims)

@@ -5,16 +5,14 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any
 
-from aerialdojo_gen.annotations.claims import Claim, SceneClaims
+from aerialdojo_gen.annotations.claims import SceneClaims, claims_from_json
 from aerialdojo_gen.annotations.format import Landmark
 from aerialdojo_gen.annotations.language.sides import WRITTEN
 from aerialdojo_gen.annotations.language.writer import Text, Writer
-from aerialdojo_gen.annotations.relations import SceneGeometry
 from aerialdojo_gen.annotations.vocabulary import Vocabulary
 from aerialdojo_gen.base.cli_context import command
 from aerialdojo_gen.base.config.sections import DescribeConfig
 from aerialdojo_gen.base.errors import AnnotationError
-from aerialdojo_gen.base.safe_parse import loads_json
 from aerialdojo_gen.pipeline.stage import Job, Output
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.store.schemas import DESCRIPTIONS
@@ -27,12 +25,12 @@ def run(job: Job, config: DescribeConfig) -> Output:
     shown = {row["object_id"]: set(row["parts_shown"]) for row in job.read("references").to_pylist()}
     vocabulary = Vocabulary.of(job.scene_model(), load_catalogue(job.roots.scene_assets))
     marks = [Landmark(id=m["landmark_id"], name=m["name"], node=m["mesh_node"]) for m in landmarks]
-    claims = SceneClaims(vocabulary, marks, SceneGeometry.of(vocabulary.scene))
+    claims = SceneClaims(vocabulary, marks)
     writer = Writer(claims, [mark.name for mark in marks], job.seed, job.stage)
     rows: list[dict[str, Any]] = []
     counts = {"written by a person": 0, "with fewer texts": 0}
     for item in objects:
-        own = [Claim.from_json(raw) for raw in loads_json(item["claims"])]
+        own = claims_from_json(item["claims"])
         texts = writer.texts(
             claims.geometry.index[item["mesh_node"]], own, shown[item["object_id"]], config.paraphrases
         )
