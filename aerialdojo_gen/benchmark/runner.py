@@ -11,24 +11,28 @@ import hashlib
 import json
 import time
 from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from aerialdojo_gen.base.errors import StoreError, UsageError
+from aerialdojo_gen.base.errors import AerialDojoError, StoreError, UsageError
 from aerialdojo_gen.base.safe_parse import read_json
+from aerialdojo_gen.base.secrets import Secrets
 from aerialdojo_gen.benchmark import episodes
 from aerialdojo_gen.benchmark.agents import ServiceDown, agent_class, load_agent
-from aerialdojo_gen.benchmark.evaluation import BudgetTracker, Evaluation, Limits, Outcome, agent_code_digest
+from aerialdojo_gen.benchmark.evaluation import Evaluation, Limits, Outcome, agent_code_digest
 from aerialdojo_gen.benchmark.flight import no_viewpoints_message, viewpoints_content
 from aerialdojo_gen.benchmark.journal import Journals
 from aerialdojo_gen.benchmark.tasks import goals_withheld, select
-from aerialdojo_gen.benchmark.worker import Finished, WorkUnit
-from aerialdojo_gen.benchmark.workers import fly_units
-from aerialdojo_gen.pipeline.executors import SharedPaths, make_executor, on_disk
+from aerialdojo_gen.benchmark.worker import Finished, Worker, WorkUnit
+from aerialdojo_gen.dataset.contents import release_fingerprint
+from aerialdojo_gen.pipeline.executors import Executor, ParentChannel, SharedPaths, make_executor, on_disk
+from aerialdojo_gen.pipeline.executors.channels import WorkerChannel, at_end
 from aerialdojo_gen.pipeline.interrupt import Interrupts
 from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.store import shards as store
@@ -65,17 +69,18 @@ def evaluate(
             evaluation = preflight(evaluation, limits, reporter)
             if run.no_viewpoints_message and run.goals_known:
                 reporter.line(no_viewpoints_message(run.no_viewpoints_message, len(rows["scene"].unique())))
-        budget = BudgetTracker(limits, *run.spent())
+        total = run.spent()
         with reporter.bar(evaluation.label, todo.num_rows, "episodes") as bar:
 
             def on_finished(finished: Finished) -> None:
-                budget.total += finished
+                nonlocal total
+                total += finished
                 bar.advance(finished.episodes)
 
             def stopped() -> bool:
                 interrupts.check()
                 run.checkpoint(reporter)
-                return bool(budget.spent or budget.failing)
+                return bool(limits.reached(total) or limits.failing(total))
 
             try:
                 # The processes have ended when their journals are flushed.
@@ -87,16 +92,15 @@ def evaluate(
                         run.flush_journals(scene)
             except ServiceDown as error:
                 raise ServiceDown(f"{error} Finished episodes are kept: the same command continues") from None
-        if budget.spent and len(run.todo(False)):
-            reporter.line(f"stopped at {budget.spent}: the same command with a higher limit continues")
+        if (limit := limits.reached(total)) and len(run.todo(False)):
+            reporter.line(f"stopped at {limit}: the same command with a higher limit continues")
         finished, failed, successes = run.counts()
     why = ""
-    if budget.failing is not None:
-        why = f"stopped after {limits.failures_in_row} failures in a row of one kind ({budget.failing.kind})."
-    now, seconds = budget.total, time.monotonic() - started
+    if kind := limits.failing(total):
+        why = f"stopped after {limits.failures_in_row} failures in a row of one kind ({kind})."
     return Outcome(
-        rows.num_rows, finished, failed, now.episodes, now.actions, now.cost_usd, now.tokens, seconds, why,
-        run.failures(), now.flown, successes if run.goals_known else None,
+        rows.num_rows, finished, failed, total.episodes, total.actions, total.cost_usd, total.tokens,
+        time.monotonic() - started, why, run.failures(), total.flown, successes if run.goals_known else None,
     )  # fmt: skip
 
 
@@ -194,12 +198,12 @@ class RunLog:
         counted = Counter(row["kind"] for row in rows).most_common()
         return tuple(f"{n} × {kind}{'' if i else f' ({first[kind]})'}" for i, (kind, n) in enumerate(counted))
 
-    def spent(self) -> tuple[float, int]:
+    def spent(self) -> Finished:
         """US dollars and tokens spent so far."""
         columns = ("cost_usd", "input_tokens", "output_tokens")
         rows = self._read("episodes", *columns) + self._read("failures", *columns)
         tokens = sum((row["input_tokens"] or 0) + (row["output_tokens"] or 0) for row in rows)
-        return sum(row["cost_usd"] or 0.0 for row in rows), tokens
+        return Finished(cost_usd=sum(row["cost_usd"] or 0.0 for row in rows), tokens=tokens)
 
     def _read(self, table: str, *columns: str) -> list[dict[str, Any]]:
         """Read columns of a table of the run, all scenes that are written."""
@@ -246,3 +250,65 @@ def preflight(evaluation: Evaluation, limits: Limits, reporter: Reporter) -> Eva
     finally:
         agent.close()
     return replace(evaluation, options={**evaluation.options, **settled}, used=used)
+
+
+# Assumed memory per process, megabytes, without an agent's model.
+MEMORY_MB = 1000
+
+
+def fly_units(
+    data: DataRoot, evaluation: Evaluation, units: Sequence[WorkUnit], executor: Executor,
+    on_finished: Callable[[Finished], None], stopped: Callable[[], bool],
+) -> Iterator[str]:  # fmt: skip
+    """Fly units, and yield a scene when all of its units are finished."""
+    left = Counter(unit.scene for unit in units)
+    fly, channel = partial(_fly, data, evaluation), ParentChannel(on_finished, stopped)
+    for outcome in executor.map(fly, units, lambda unit: unit.scene, channel=channel, memory_mb=MEMORY_MB):
+        if isinstance(outcome, AerialDojoError):
+            raise outcome
+        left[outcome] -= 1
+        if not left[outcome]:
+            yield outcome
+
+
+# This process's worker, made at its first unit: an agent may hold a model, and the flight holds scenes.
+_worker_of_process: dict[str, Worker] = {}
+
+
+def _make_worker(data: DataRoot, evaluation: Evaluation, link: WorkerChannel) -> Worker:
+    """Make a worker with its agent, which is closed when the process has done its work."""
+    agent: Any = load_agent(evaluation.agent, **evaluation.options)
+    if evaluation.requests_per_minute is not None:
+        if not hasattr(agent, "pace"):
+            raise UsageError(f"agent {evaluation.agent!r} has no attribute pace: leave --requests-per-minute out")
+        # Requests of all workers are spaced evenly.
+        interval_s = 60.0 / evaluation.requests_per_minute
+        agent.pace = lambda: time.sleep(link.turn(interval_s))
+    if hasattr(agent, "suits"):
+        agent.suits(release_fingerprint(data))
+    flight = evaluation.flight_of(agent, data)
+    at_end(_worker_of_process.clear)
+    if hasattr(agent, "close"):
+        at_end(agent.close)
+    secrets = Secrets(evaluation.options)
+    return Worker(agent, flight, data, evaluation.identity(), evaluation.retry_policy, secrets)
+
+
+def _fly(data: DataRoot, evaluation: Evaluation, unit: WorkUnit, link: WorkerChannel) -> str:
+    if "worker" not in _worker_of_process:
+        _worker_of_process["worker"] = _make_worker(data, evaluation, link)
+    unsent, last = Finished(), time.monotonic()
+
+    def add(finished: Finished) -> None:
+        nonlocal unsent, last
+        unsent += finished
+        if time.monotonic() - last >= link.every_s:
+            link.send(unsent)
+            unsent, last = Finished(), time.monotonic()
+
+    try:
+        _worker_of_process["worker"].fly(unit, add, link.stopped)
+    finally:
+        if unsent.episodes:
+            link.send(unsent)
+    return unit.scene

@@ -33,14 +33,14 @@ def as_json(request: ReportRequest) -> str:
 
 
 def _rows(request: ReportRequest) -> Iterator[list[Any]]:
-    data = request.broken_down
     for k, run in enumerate(request.runs):
         settings, modalities = (
-            data.values(column, Cut(k), order) for column, order in (("setting", SETTINGS), ("modality", MODALITIES))
+            request.values(column, Cut(k), order)
+            for column, order in (("setting", SETTINGS), ("modality", MODALITIES))
         )
         parts = [("all", "all"), *((s, "all") for s in settings), *(("all", m) for m in modalities)]
         parts += [
-            (s, m) for s in settings for m in data.values("modality", Cut(k, where=(("setting", s),)), MODALITIES)
+            (s, m) for s in settings for m in request.values("modality", Cut(k, where=(("setting", s),)), MODALITIES)
         ]
         for profile in request.profiles:
             for setting, modality in parts:
@@ -59,22 +59,20 @@ def _rows(request: ReportRequest) -> Iterator[list[Any]]:
 
 def _scores(request: ReportRequest, whole: Cut) -> Iterator[list[Any]]:
     """Score a part of a log in every scope, with deviations and ends of intervals where they are known."""
-    data = request.broken_down
-    summary, unknown = data.summary(whole), [math.nan] * (3 * len(METRICS))
+    summary, unknown = request.summary(whole), [math.nan] * (3 * len(METRICS))
 
     def known(scope: str, name: str, cut: Cut) -> list[Any]:
-        own = data.summary(cut)
-        ends = [end for pair in data.intervals(cut) for end in pair]
-        return [scope, name, *own.overall, *own.deviation[1:], *ends]
+        own = request.summary(cut)
+        return [scope, name, *own.overall, *own.deviation[1:], *request.interval(cut).T.ravel().tolist()]
 
     yield known("overall", "overall", whole)
-    yield ["task_weighted", "task_weighted", *data.score(whole | Cut(weighted=True)), *unknown]
+    yield ["task_weighted", "task_weighted", *request.score(whole | Cut(weighted=True)), *unknown]
     yield from (["family", name, *score, *unknown] for name, score in summary.families.items())
     for column in ("partition", "scene_type", "malls"):
-        for name in data.values(column, whole):
-            yield [column, name, *data.score(whole | Cut(where=((column, name),))), *unknown]
+        for name in request.values(column, whole):
+            yield [column, name, *request.score(whole | Cut(where=((column, name),))), *unknown]
     yield from (["scene", name, *score, *unknown] for name, score in summary.scenes.items())
     if not whole.where:
-        for found in request.breakdowns.found:
+        for column, found in request.breakdowns.found.items():
             for part in found.parts:
-                yield known(found.name, part, whole | Cut(where=((found.name, part),)))
+                yield known(column, part, whole | Cut(where=((column, part),)))

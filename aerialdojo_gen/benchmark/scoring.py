@@ -25,8 +25,7 @@ from aerialdojo_gen.base.safe_parse import read_json
 from aerialdojo_gen.base.version import __version__
 from aerialdojo_gen.benchmark.agents.goal import BLIND
 from aerialdojo_gen.benchmark.evaluation import Evaluation
-from aerialdojo_gen.benchmark.intervals import score_intervals
-from aerialdojo_gen.benchmark.metrics import DEFAULT_PROFILES, METRICS, PROFILES, episodes_of, summarize
+from aerialdojo_gen.benchmark.metrics import DEFAULT_PROFILES, METRICS, PROFILES, bootstrap, episodes_of, summarize
 from aerialdojo_gen.benchmark.runner import evaluate
 from aerialdojo_gen.benchmark.runs import ADAPTED, mark_adapted
 from aerialdojo_gen.benchmark.submission import (
@@ -132,10 +131,10 @@ def score(
         evaluate(root, replay, out=temporary, workers=workers, reporter=reporter)
         found = logged(open_root(temporary), name)
         _check_replay(file, submission, found)
-        marked = mark_adapted(episodes_of(found.table), submission.run.agent_options)
+        marked = mark_adapted(found.table, submission.run.agent_options)
         card = ScoreCard(
             name=name, agent=submission.run.agent, told=submission.run.told,
-            adapted=adapted or bool((marked.partition == ADAPTED).any()),
+            adapted=adapted or ADAPTED in marked["partition"].to_pylist(),
             scored=f"{datetime.datetime.now(datetime.UTC):%Y-%m-%d}, by {__version__}",
             code=submission.run.code, tasks=tasks, rows=list(_score_rows(found.table)),
         )  # fmt: skip
@@ -245,13 +244,13 @@ def _score_rows(table: pa.Table) -> Iterator[ScoreRow]:
     episodes = episodes_of(table)
     for setting in ("all", *SETTINGS):
         for partition in ("all", "ID", "OOD"):
-            chosen = (episodes.setting == setting) | (setting == "all")
-            chosen &= (episodes.partition == partition) | (partition == "all")
+            chosen = (episodes["setting"] == setting) | (setting == "all")
+            chosen &= (episodes["partition"] == partition) | (partition == "all")
             if not chosen.any():
                 continue
             for profile in map(PROFILES.__getitem__, DEFAULT_PROFILES):
-                summary = summarize(episodes.where(chosen), profile)
-                low, high = zip(*score_intervals(summary), strict=True)
+                summary = summarize(episodes[chosen], profile)
+                low, high = bootstrap(summary.scene_scores()).tolist()
                 yield ScoreRow(
                     setting=setting, partition=partition, radius_m=profile.radius_m, episodes=int(chosen.sum()),
                     mean=_known(summary.overall[1:]), low=_known(low), high=_known(high),

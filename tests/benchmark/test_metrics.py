@@ -190,7 +190,7 @@ def test_scores_are_bounded_and_ordered(drawn, profile):
         assert math.isnan(scored.sr_view) if profile.planar else 0.0 <= scored.sr_view <= 1.0
     # A goal is a viewpoint of its target: who succeeds and sees it succeeds so too.
     judged = outcomes(episodes, profile)
-    sees = np.isfinite(episodes.view_distance_m)
+    sees = np.isfinite(episodes["view_distance_m"])
     if not profile.planar:
         assert (judged.success_view[judged.success & sees] == 1.0).all()
         assert not judged.success_view[~sees].any()

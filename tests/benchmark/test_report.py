@@ -63,7 +63,7 @@ def test_conduct_counts_ends_and_does_not_add_what_is_not_known():
     for run in map(made_run, AGENTS):
         cells = tables.outcome_cells(run, AT_3)
         assert sum(map(float, cells[:3])) == pytest.approx(100.0, abs=0.15)
-        assert float(cells[1]) == pytest.approx(100.0 * run.episodes.collision.mean(), abs=0.05)
+        assert float(cells[1]) == pytest.approx(100.0 * run.episodes["collision"].mean(), abs=0.05)
         asks = ("10,080", "13,104,000", "478,800", "52.92")
         assert cells[6:] == (asks if run.agent == "explorer" else ("–",) * 4)
 

@@ -224,7 +224,7 @@ def test_radii_gains_reversals_and_what_lies_between_poses(runs):
     assert lost == ("18", "10", "4", "6", "16.7", "50.0", "16.7", "16.7")
     assert cells(made("visits", runs), "stop") == ("18", "0", "0", "0", "–", "–", "–", "–")
     assert runs[0].path_clearance_to_goal_m is not None
-    assert min(runs[0].path_clearance_to_goal_m[runs[0].episodes.scene == "N_Coast_1"]) == pytest.approx(2.8)
+    assert min(runs[0].path_clearance_to_goal_m[runs[0].episodes["scene"] == "N_Coast_1"]) == pytest.approx(2.8)
 
 
 def test_a_log_without_steps_has_no_distances_along_the_way(log, tmp_path):
@@ -250,7 +250,10 @@ def test_a_paired_comparison_is_of_common_tasks_and_exact(log, runs):
     assert paired.paired_tables(whole, [AT_3])[0].notes[0].startswith("18 tasks")
     with pytest.raises(UsageError, match="two runs, not 3"):
         paired.paired_tables(runs, [AT_3])
-    apart = [runs[0].where(runs[0].episodes.scene == "U_Mall_0"), runs[1].where(runs[1].episodes.scene == "U_Mall_1")]
+    apart = [
+        runs[0].where(runs[0].episodes["scene"] == "U_Mall_0"),
+        runs[1].where(runs[1].episodes["scene"] == "U_Mall_1"),
+    ]
     with pytest.raises(UsageError, match="alpha and beta have no task in common"):
         paired.paired_tables(apart, [AT_3])
 
@@ -270,7 +273,7 @@ def test_intervals_are_the_exact_ones(runs):
     # The log does not say SR-view: that has no interval, and the others have theirs.
     assert [math.isnan(low) for low, _ in found] == [False, True, False, False, False, False]
     # How far scenes differ is not known of a family with one of them.
-    one = runs[0].episodes.where(runs[0].episodes.scene != "U_Mall_1")
+    one = runs[0].episodes.where(runs[0].episodes["scene"] != "U_Mall_1")
     assert all(math.isnan(end) for ends in intervals.score_intervals(summarize(one, AT_3)) for end in ends)
 
 
