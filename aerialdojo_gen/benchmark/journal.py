@@ -13,6 +13,7 @@ import os
 import secrets
 import shutil
 import time
+from collections import defaultdict
 from collections.abc import Iterator
 from contextlib import AbstractContextManager
 from pathlib import Path, PurePosixPath
@@ -96,30 +97,27 @@ class Journals:
 
     def __bool__(self) -> bool:
         """Whether there are any."""
-        return bool(self.scenes())
+        return bool(self._by_scene("*"))
 
-    def scenes(self, scene: str = "*") -> dict[str, tuple[list[Path], list[str]]]:
-        """List journals by scene: files of this machine, and objects of the store; of one scene where it is named."""
-        found: dict[str, tuple[list[Path], list[str]]] = {}
+    def _by_scene(self, scene: str) -> dict[str, tuple[list[Path], list[str]]]:
+        """List journals by scene: files of this machine, and objects of the store."""
+        found: dict[str, tuple[list[Path], list[str]]] = defaultdict(lambda: ([], []))
         for path in sorted(self.folder.glob(f"{scene}.*.jsonl")):
-            found.setdefault(path.name.split(".", 1)[0], ([], []))[0].append(path)
+            found[path.name.split(".", 1)[0]][0].append(path)
         for name in self._root.list(self._name, f"{scene}.*.jsonl") if self._committed else ():
-            found.setdefault(PurePosixPath(name).name.split(".", 1)[0], ([], []))[1].append(name)
+            found[PurePosixPath(name).name.split(".", 1)[0]][1].append(name)
         return found
 
-    def records(self, scene: str) -> list[dict[str, Any]]:
-        """Read the finished episodes of a scene; one may stand in a file and in an object."""
-        paths, names = self.scenes(scene).get(scene, ([], []))
-        return [record for path in [*map(self._root.local_copy, names), *paths] for record in read_journal(path)]
-
-    def remove(self, scene: str) -> None:
-        """Remove the journals of a scene, which are in the tables."""
-        paths, names = self.scenes(scene).get(scene, ([], []))
-        for path in paths:
-            path.unlink()
-            self._sent.pop(path, None)
-        for name in names:
-            self._root.delete(name)
+    def take(self, scene: str = "*") -> Iterator[tuple[str, list[dict[str, Any]]]]:
+        """Yield the finished episodes by scene, some twice, and remove their journals when the next are asked for."""
+        for own, (paths, names) in self._by_scene(scene).items():
+            files = [*map(self._root.local_copy, names), *paths]
+            yield own, [record for path in files for record in read_journal(path)]
+            for path in paths:
+                path.unlink()
+                self._sent.pop(path, None)
+            for name in names:
+                self._root.delete(name)
 
     def drop(self) -> None:
         """Remove all."""

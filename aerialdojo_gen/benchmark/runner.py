@@ -160,11 +160,9 @@ class RunLog:
 
     def flush_journals(self, scene: str = "*") -> None:
         """Move the journals of a scene, or of all, into the tables."""
-        for name in self.journals.scenes(scene):
-            records = self.journals.records(name)
+        for name, records in self.journals.take(scene):
             if records:
                 episodes.add_records(self._out, self._name, name, records, self._fingerprint)
-            self.journals.remove(name)
 
     def checkpoint(self, reporter: Reporter) -> None:
         """Commit finished episodes to an object store from time to time; report an unreachable store once."""

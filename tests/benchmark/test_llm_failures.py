@@ -7,9 +7,9 @@ import pytest
 from support.llm_agents import FORWARD_3, KEY, PROTOCOLS, agent_of, begun, observation
 from support.llm_server import MOVE, Cut, Drip, Endless, Hang, Raw, Say, Status, Trickle, serving
 
+from aerialdojo_gen.base import llm_client
 from aerialdojo_gen.base.errors import AerialDojoError
-from aerialdojo_gen.base.llm_client import service as services
-from aerialdojo_gen.base.llm_client.http import retry_after_s
+from aerialdojo_gen.base.llm_client import retry_after_s
 from aerialdojo_gen.benchmark.agents import AgentUnavailable, ServiceDown
 
 pytestmark = pytest.mark.usefixtures("keys")
@@ -79,7 +79,7 @@ def test_a_service_that_is_not_there_ends_the_run(protocol):
 
 def test_requests_are_sent_again_as_often_as_asked(protocol, monkeypatch):
     waits = []
-    monkeypatch.setattr(services.time, "sleep", waits.append)
+    monkeypatch.setattr(llm_client.time, "sleep", waits.append)
     with serving(Status(500), Status(429, "m", {"retry-after": "11"}), Status(502), Say(MOVE)) as service:
         agent = begun(protocol, service, request_retries=3)
         assert agent.act(observation()) == FORWARD_3

@@ -15,7 +15,7 @@ from pydantic import ValidationError
 
 from aerialdojo_gen.base.errors import AerialDojoError, AgentUnavailable, ServiceDown, UsageError
 from aerialdojo_gen.base.explain import explain
-from aerialdojo_gen.base.llm_client.service import Connection
+from aerialdojo_gen.base.llm_client import Connection
 from aerialdojo_gen.base.pictures import Picture, colour_picture, depth_picture
 from aerialdojo_gen.base.secrets import Secrets
 from aerialdojo_gen.benchmark.agents.base import AgentBase, InvalidAnswer, Usage
