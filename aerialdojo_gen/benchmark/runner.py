@@ -25,9 +25,9 @@ from aerialdojo_gen.base.safe_parse import read_json
 from aerialdojo_gen.base.secrets import Secrets
 from aerialdojo_gen.benchmark import episodes
 from aerialdojo_gen.benchmark.agents import ServiceDown, agent_class, load_agent
+from aerialdojo_gen.benchmark.episodes import Journals
 from aerialdojo_gen.benchmark.evaluation import Evaluation, Limits, Outcome, agent_code_digest
 from aerialdojo_gen.benchmark.flight import no_viewpoints_message, viewpoints_content
-from aerialdojo_gen.benchmark.journal import Journals
 from aerialdojo_gen.benchmark.tasks import goals_withheld, select
 from aerialdojo_gen.benchmark.worker import Finished, Worker, WorkUnit
 from aerialdojo_gen.dataset.contents import release_fingerprint

@@ -104,26 +104,23 @@ def load_runs(data: Where, names: Sequence[str] = (), sample: Sample | None = No
         rows = read_run(root, name, table)
         return rows if sample is None else rows.filter(pc.is_in(rows["task_id"], pa.array(sample.ids(), pa.string())))
 
-    tables = {name: read(name) for name in (names or run_names(root))}
-    if not names:
-        tables = {name: table for name, table in tables.items() if table.num_rows}
-    if not tables:
-        what = "no runs" if sample is None else "no episodes of the paper's sample"
-        raise StoreError(f"{what} in {root}: run {command('evaluate', protocol=sample and 'paper')}")
-    for name, table in tables.items():
+    loaded, of = [], "" if sample is None else " of the paper's sample"
+    for name in dict.fromkeys(names or run_names(root)):
+        table = read(name)
+        if not table.num_rows and not names:
+            continue
+        failed = read(name, "failures").num_rows
         if not table.num_rows:
-            failed = read(name, "failures").num_rows
             said = f", and {failed:,} that failed: fly them again with" if failed else ": run"
             rerun_command = command("evaluate", run=name, protocol=sample and "paper", rerun_failed=bool(failed))
-            of = "" if sample is None else " of the paper's sample"
             raise StoreError(f"run {name!r} has no finished episode{of}{said} {rerun_command}")
-    loaded = []
-    for name, table in tables.items():
         agent, options, told = (table[column][0].as_py() for column in ("agent", "agent_options", "told"))
         # With hints it is another contender.
         label = f"{agent} + {told}" if told else agent
-        failed, marked = read(name, "failures").num_rows, mark_adapted(table, options)
-        loaded.append(Run(name, label, agent, options, marked, failed, root, hints=told or ""))
+        loaded.append(Run(name, label, agent, options, mark_adapted(table, options), failed, root, hints=told or ""))
+    if not loaded:
+        what = "no runs" if sample is None else f"no episodes{of}"
+        raise StoreError(f"{what} in {root}: run {command('evaluate', protocol=sample and 'paper')}")
     labels = Counter(run.label for run in loaded)
     return [replace(run, label=f"{run.label} ({run.name})") if labels[run.label] > 1 else run for run in loaded]
 

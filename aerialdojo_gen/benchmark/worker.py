@@ -18,8 +18,8 @@ from aerialdojo_gen.benchmark.agents import Agent, AgentUnavailable, InvalidAnsw
 from aerialdojo_gen.benchmark.agents.goal import N_ACTIONS, Goal, Observation
 from aerialdojo_gen.benchmark.agents.load import add_traceback, error_location
 from aerialdojo_gen.benchmark.agents.simple import OracleAgent, SubmittedAgent
+from aerialdojo_gen.benchmark.episodes import Journal
 from aerialdojo_gen.benchmark.flight import Flight
-from aerialdojo_gen.benchmark.journal import Journal
 from aerialdojo_gen.benchmark.tasks import Task, read_tasks, reference_actions
 from aerialdojo_gen.rendering.backend import close_renderers
 from aerialdojo_gen.store.root import DataRoot

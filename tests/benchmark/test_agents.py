@@ -205,7 +205,7 @@ def test_the_explorer_flies_on_and_touches_nothing(village):
             episode.step(agent.act(seer.look(episode)))
         assert (episode.termination, episode.n_actions) == ("stop", 60), "the last action is a Stop"
         moved = complex(*episode.position[:2]) - complex(*start[:2])
-        own = complex(agent._x_m, agent._y_m) * cmath.exp(0.7j * k)
+        own = complex(*agent._xy_m) * cmath.exp(0.7j * k)
         assert own == pytest.approx(moved, abs=1e-6), "it knows where it is"
         lengths.append(episode.path_length_m)
     assert len(lengths) >= 2

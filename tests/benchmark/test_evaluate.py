@@ -17,9 +17,8 @@ from support.command_line import called
 from aerialdojo_gen.base.errors import StoreError, UsageError
 from aerialdojo_gen.benchmark.agents import AgentBase, AgentUnavailable, InvalidAnswer, Usage
 from aerialdojo_gen.benchmark.agents.goal import BLIND
-from aerialdojo_gen.benchmark.episodes import TABLES, read_run, runs
+from aerialdojo_gen.benchmark.episodes import TABLES, Journal, read_journal, read_run, runs
 from aerialdojo_gen.benchmark.evaluation import Limits
-from aerialdojo_gen.benchmark.journal import Journal, read_journal
 from aerialdojo_gen.benchmark.runner import Evaluation, Outcome, evaluate
 from aerialdojo_gen.benchmark.tasks import Selection, select
 from aerialdojo_gen.benchmark.worker import RetryPolicy

@@ -19,8 +19,7 @@ from aerialdojo_gen.benchmark.metrics import PROFILES
 from aerialdojo_gen.benchmark.registry import report_tables
 from aerialdojo_gen.benchmark.runner import Evaluation, evaluate
 from aerialdojo_gen.benchmark.runs import load_runs
-from aerialdojo_gen.benchmark.score_rows import as_csv
-from aerialdojo_gen.benchmark.tables import ReportRequest
+from aerialdojo_gen.benchmark.tables import ReportRequest, as_csv
 from aerialdojo_gen.benchmark.tasks import Selection, goal_of, read_tasks, select, texts_of_tasks
 from aerialdojo_gen.geometry.frames import compass_direction, compass_heading
 from aerialdojo_gen.geometry.motion import TURN_RAD, TURNS

@@ -33,7 +33,7 @@ def log(*rows):
 
 def judged(profile=AT_3, **row):
     o = outcomes(log(row), profile)
-    return bool(o.success[0]), bool(o.oracle_success[0]), float(o.spl[0])
+    return bool(o.sr[0]), bool(o.osr[0]), float(o.spl[0])
 
 
 @pytest.mark.parametrize(
@@ -78,9 +78,9 @@ NO_VIEW = {"viewpoint_distance_m": None, "target_in_sight": None}  # Of a releas
     ],
 )
 def test_success_at_any_viewpoint(row, expected):
-    assert outcomes(log(row), AT_3).success_view[0] == pytest.approx(expected, nan_ok=True)
+    assert outcomes(log(row), AT_3).sr_view[0] == pytest.approx(expected, nan_ok=True)
     # In the plane there is no distance to viewpoints in the log.
-    assert math.isnan(outcomes(log(row), profile_named("aerialvln")).success_view[0])
+    assert math.isnan(outcomes(log(row), profile_named("aerialvln")).sr_view[0])
 
 
 def test_a_rate_with_a_hole_in_it_is_not_known():
@@ -125,7 +125,7 @@ def test_one_scene_has_no_deviation_and_one_family_and_an_empty_log_no_score():
     assert math.isnan(summary.deviation.sr)
     assert list(summary.families) == ["Urban"]
     assert summary.overall.sr == 1.0
-    empty = summarize(episodes.where(np.array([False, False])), AT_3)
+    empty = summarize(episodes[:0], AT_3)
     assert (empty.scenes, math.isnan(empty.overall.sr)) == ({}, True)
 
 
@@ -192,8 +192,8 @@ def test_scores_are_bounded_and_ordered(drawn, profile):
     judged = outcomes(episodes, profile)
     sees = np.isfinite(episodes["view_distance_m"])
     if not profile.planar:
-        assert (judged.success_view[judged.success & sees] == 1.0).all()
-        assert not judged.success_view[~sees].any()
+        assert (judged.sr_view[judged.sr & sees] == 1.0).all()
+        assert not judged.sr_view[~sees].any()
     assert sum(s.episodes for s in summary.scenes.values()) == len(drawn) == summary.overall.episodes
     np.testing.assert_equal(summarize(log(*drawn[::-1]), profile).overall, summary.overall)  # In any order
 

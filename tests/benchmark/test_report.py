@@ -19,7 +19,7 @@ from aerialdojo_gen.base import table_formats
 from aerialdojo_gen.base.errors import AerialDojoError, StoreError
 from aerialdojo_gen.base.paper_figures import results
 from aerialdojo_gen.base.text_table import BEST, SECOND, Column, TextTable
-from aerialdojo_gen.benchmark import figures, registry, score_rows, tables
+from aerialdojo_gen.benchmark import figures, registry, tables
 from aerialdojo_gen.benchmark.metrics import PROFILES, summarize
 from aerialdojo_gen.benchmark.report import html, write_report
 from aerialdojo_gen.benchmark.runs import Run, load_runs
@@ -212,7 +212,7 @@ def test_axes_end_at_round_numbers(largest, end):
 
 
 def test_the_csv_holds_every_score_unrounded(few_runs):
-    rows = list(csv.DictReader(io.StringIO(score_rows.as_csv(wanted(few_runs[1:2], AT_3, AT_5)))))
+    rows = list(csv.DictReader(io.StringIO(tables.as_csv(wanted(few_runs[1:2], AT_3, AT_5)))))
     found = {tuple(row[k] for k in ("profile", "setting", "modality", "scope", "name")): row for row in rows}
     assert len(found) == len(rows)
     # Two profiles, all and three settings by all and two modalities: all scopes have a row where flown.
@@ -251,7 +251,7 @@ def test_the_folder_of_a_report_is_whole_and_its_figures_are_always_the_same(tmp
 
 def test_a_page_loads_nothing_and_escapes_everything(few_runs):
     run = few_runs[1]
-    nasty = Run(NASTY, NASTY + "\u202e", NASTY + "\u202e", '{"x": "' + NASTY + '"}', run.table, run.episodes)
+    nasty = Run(NASTY, NASTY + "\u202e", NASTY + "\u202e", '{"x": "' + NASTY + '"}', run.table)
     made = dataclasses.replace(wanted([nasty], AT_3), sample=Sample({}))
     figures = dict.fromkeys(("families", "radar", "radius"), b"<svg/>")
     page = html(made, [], figures, registry.named_tables(made, ["all"]))

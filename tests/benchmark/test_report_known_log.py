@@ -16,8 +16,8 @@ from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.base.paper_figures import results
 from aerialdojo_gen.base.table_formats import as_text
 from aerialdojo_gen.base.text_table import BEST, SECOND
-from aerialdojo_gen.benchmark import intervals, paired, registry, score_rows
-from aerialdojo_gen.benchmark.metrics import PROFILES, summarize
+from aerialdojo_gen.benchmark import paired, registry, tables
+from aerialdojo_gen.benchmark.metrics import PROFILES, bootstrap, summarize
 from aerialdojo_gen.benchmark.runs import group_runs, load_runs, with_baselines
 from aerialdojo_gen.benchmark.tables import ReportRequest
 from aerialdojo_gen.store import schemas
@@ -155,7 +155,7 @@ def test_tables_4_and_5_with_the_papers_rows(runs):
     assert made("results", runs, intervals=False).rows[1][0] == "package:Beta"
     assert max(map(len, as_text(table, 120).splitlines())) <= 120
     # As CSV.
-    found = list(csv.DictReader(io.StringIO(score_rows.as_csv(request))))
+    found = list(csv.DictReader(io.StringIO(tables.as_csv(request))))
     keys = ("agent", "radius_m", "setting", "scope", "name")
     by_key = {tuple(row[key] for key in keys): row for row in found if row["modality"] == "all"}
     opus = by_key["Claude Opus 5", "3.0", "base", "overall", "overall"]
@@ -259,22 +259,23 @@ def test_a_paired_comparison_is_of_common_tasks_and_exact(log, runs):
 
 
 def test_intervals_are_the_exact_ones(runs):
-    found = intervals.score_intervals(summarize(runs[0].episodes, AT_3))
-    families = [part[:, 0].tolist() for part in intervals.scene_scores(summarize(runs[0].episodes, AT_3))]
+    scored = summarize(runs[0].episodes, AT_3).scene_scores()
+    found = bootstrap(scored)
+    families = [part[:, 0].tolist() for part in scored]
     assert families == [[0.25, 0.0], [0.5, 0.0], [0.0, 1.0], [0.0, 0.0]]
     # Every draw of two scenes a family, all alike likely.
     draws = product(*(list(product(scenes, repeat=2)) for scenes in families))
     means = sorted(sum(sum(draw) / 2 for draw in drawn) / 4 for drawn in draws)
-    low, high = found[0]
+    low, high = found[:, 0]
     assert np.mean(np.array(means) < low - 1e-9) <= 0.03 <= 0.2
     assert low == pytest.approx(np.quantile(means, 0.025), abs=0.016)
     assert high == pytest.approx(np.quantile(means, 0.975), abs=0.016)
-    np.testing.assert_equal(found, intervals.score_intervals(summarize(runs[0].episodes, AT_3)))
+    np.testing.assert_equal(found, bootstrap(scored))
     # The log does not say SR-view: that has no interval, and the others have theirs.
-    assert [math.isnan(low) for low, _ in found] == [False, True, False, False, False, False]
+    assert np.isnan(found).tolist() == [[False, True, False, False, False, False]] * 2
     # How far scenes differ is not known of a family with one of them.
-    one = runs[0].episodes.where(runs[0].episodes["scene"] != "U_Mall_1")
-    assert all(math.isnan(end) for ends in intervals.score_intervals(summarize(one, AT_3)) for end in ends)
+    one = runs[0].episodes[runs[0].episodes["scene"] != "U_Mall_1"]
+    assert np.isnan(bootstrap(summarize(one, AT_3).scene_scores())).all()
 
 
 def test_tables_are_chosen_by_name(log, runs):

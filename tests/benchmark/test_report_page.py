@@ -48,8 +48,8 @@ def shown(smoke, log, runs):
 def test_the_metrics_judge_a_log_as_the_runner_did(runs):
     for run in runs:
         judged = outcomes(run.episodes, AT_3)
-        assert judged.success.tolist() == run.table["success"].to_pylist()
-        assert judged.oracle_success.tolist() == run.table["oracle_success"].to_pylist()
+        assert judged.sr.tolist() == run.table["success"].to_pylist()
+        assert judged.osr.tolist() == run.table["oracle_success"].to_pylist()
     summary = summarize(runs[0].episodes, AT_3).overall
     assert (summary.sr, summary.osr, summary.cr) == (1.0, 1.0, 0.0)
     assert summary.spl >= 0.99

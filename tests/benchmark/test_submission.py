@@ -12,7 +12,7 @@ from support.browser import errors
 from support.command_line import said
 
 from aerialdojo_gen.base.errors import StoreError, UsageError
-from aerialdojo_gen.benchmark import score_rows
+from aerialdojo_gen.benchmark import tables
 from aerialdojo_gen.benchmark.agents import AgentBase, InvalidAnswer
 from aerialdojo_gen.benchmark.agents.goal import BLIND
 from aerialdojo_gen.benchmark.episodes import read_run
@@ -108,7 +108,7 @@ def test_scores_are_those_of_the_report(smoke, log, scored):
         request = ReportRequest(smoke, load_runs(log, [card.name]), profiles)
         rows = {
             (row["setting"], "all" if row["scope"] == "overall" else row["name"], row["radius_m"]): row
-            for row in json.loads(score_rows.as_json(request))
+            for row in json.loads(tables.as_json(request))
             if row["modality"] == "all" and row["scope"] in ("overall", "partition")
         }
         assert len(card.rows) == len(rows) >= 2 * 2 * 3

@@ -19,8 +19,7 @@ from aerialdojo_gen.benchmark.metrics import PROFILES
 from aerialdojo_gen.benchmark.registry import report_tables
 from aerialdojo_gen.benchmark.runner import Evaluation, evaluate
 from aerialdojo_gen.benchmark.runs import load_runs
-from aerialdojo_gen.benchmark.score_rows import as_csv
-from aerialdojo_gen.benchmark.tables import ReportRequest
+from aerialdojo_gen.benchmark.tables import ReportRequest, as_csv
 from aerialdojo_gen.benchmark.tasks import Selection
 from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.rendering.casters import in_sight
