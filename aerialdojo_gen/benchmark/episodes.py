@@ -1,9 +1,9 @@
 """The log of a run: `episodes`, `steps`, `timings` and `failures`, and the journals that come before them.
 
-The tables are under ``<folder>/<table>/<run>/``. A finished episode goes into a journal, a line of JSON each, so that a
-kill loses none of them. In a data directory journals are in the run's folder. An object store cannot append to a file:
-there the journals are in a local folder, and new lines are committed every `CHECKPOINT_S` seconds as an object of their
-own. Another machine that resumes the run repeats what was finished after the last checkpoint.
+The tables are under ``<folder>/<table>/<run>/``. A finished episode goes into a journal, a line of JSON each, so that
+a kill loses none of them. In a data directory journals are in the run's folder. An object store cannot append to a
+file: there the journals are in a local folder, and new lines are committed every `CHECKPOINT_S` seconds as an object
+of their own. Another machine that resumes the run repeats what was finished after the last checkpoint.
 """
 
 from __future__ import annotations
