@@ -76,6 +76,7 @@ class Connection:
         secrets: Secrets | None = None,
         key_variable: str | None = None,
         model: str = "",
+        pace: Callable[[], object] = lambda: None,
     ) -> None:
         try:
             self._package = importlib.import_module(package)
@@ -91,6 +92,7 @@ class Connection:
         self._key = api_key(key_variable or f"{package.upper()}_API_KEY", self.base_url if not key_variable else None)
         self._secrets = secrets or Secrets()
         self._timeout_s, self._retries, self._model = timeout_s, retries, model
+        self._pace = pace  # Called before each request; waits until one may be sent
         self.name = self.base_url or _CLIENTS[package]
         self.meter = Meter()
         # Less than the deadline, so that an address where nobody listens is not taken for a slow answer.
@@ -117,8 +119,7 @@ class Connection:
         return retrying(self._once, ask)
 
     def _once(self, ask: Callable[[Any], Awaitable[Result]]) -> Result:
-        if self.meter.pace is not None:
-            self.meter.pace()
+        self._pace()
         began = time.monotonic()
         future = asyncio.run_coroutine_threadsafe(self._within_deadline(ask), self._loop)
         try:
@@ -235,11 +236,6 @@ class Meter:
     requests: int = 0  # Sent, repeated ones too
     seconds: float = 0.0  # From sending a request to having its answer whole: of all together, and of the longest
     longest_s: float = 0.0
-    pace: Callable[[], None] | None = None  # Called before each request; waits until one may be sent
-
-    def reset(self) -> None:
-        """Begin to count anew."""
-        self.requests, self.seconds, self.longest_s = 0, 0.0, 0.0
 
     def add(self, seconds: float) -> None:
         """Count a request."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import importlib.util
 import json
@@ -149,15 +150,10 @@ def agent_code_digest(agent: str) -> str:
     parts = dict(code_of("aerialdojo_gen.benchmark.worker").parts)
     if module.split(".")[0] == "aerialdojo_gen":
         parts |= code_of(module).parts
-    elif (path := _file_of(module)) is not None:
-        parts[module] = file_digest(path)
+    else:
+        add_working_directory()
+        with contextlib.suppress(ImportError, ValueError):
+            spec = importlib.util.find_spec(module)
+            if spec is not None and spec.origin and (path := Path(spec.origin)).is_file():
+                parts[module] = file_digest(path)
     return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
-
-
-def _file_of(module: str) -> Path | None:
-    add_working_directory()
-    try:
-        spec = importlib.util.find_spec(module)
-    except (ImportError, ValueError):
-        return None
-    return Path(spec.origin) if spec is not None and spec.origin and Path(spec.origin).is_file() else None

@@ -156,11 +156,9 @@ def knows_views(episodes: Episodes, profile: Profile) -> bool:
 
 def distances(episodes: Episodes, profile: Profile) -> tuple[Floats, Floats]:
     """Return the last and the smallest distance to the goal, (n,) float64, metres, as a profile measures them."""
-    if profile.planar:
-        final, nearest = episodes["final_horizontal_distance_m"], episodes["min_horizontal_distance_m"]
-    else:
-        final, nearest = episodes["final_distance_m"], episodes["min_distance_m"]
-    return final, np.minimum(nearest, final)
+    plane = "horizontal_" if profile.planar else ""
+    final = episodes[f"final_{plane}distance_m"]
+    return final, np.minimum(episodes[f"min_{plane}distance_m"], final)
 
 
 def may_succeed(episodes: Episodes, profile: Profile) -> Bools:

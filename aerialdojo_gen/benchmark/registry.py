@@ -98,10 +98,6 @@ def _by_run(request: ReportRequest) -> list[Cell]:
     return [Cell(run.label, name, Cut(k)) for k, run in enumerate(request.runs) for name in request.shown()]
 
 
-def _by_average(request: ReportRequest) -> list[Cell]:
-    return _cells({"mean of the families": Cut(), "mean of the tasks": Cut(weighted=True)}, request.shown())
-
-
 def _by_profile(request: ReportRequest, metrics: Sequence[str]) -> list[Cell]:
     """Make columns a success rule: all measures of the first, some of the others."""
     first = request.profiles[0]
@@ -319,7 +315,9 @@ _TABLES: dict[str, Callable[[ReportRequest], list[TextTable]]] = {
         notes=_adapted_notes(r.runs),
     ),
     "family": lambda r: _by_first_rule(r, "By family", run_rows(r), _by(r, "family")),
-    "averages": lambda r: _by_first_rule(r, "Two averages", _headline_rows(r), _by_average(r), notes=[
+    "averages": lambda r: _by_first_rule(r, "Two averages", _headline_rows(r), _cells(
+        {"mean of the families": Cut(), "mean of the tasks": Cut(weighted=True)}, r.shown()
+    ), notes=[
         "A family counts a quarter on the left, as much as it has tasks on the right: two different populations."
     ]),
     "setting": lambda r: _by_first_rule(r, "By setting", run_rows(r), _by(r, "setting")),

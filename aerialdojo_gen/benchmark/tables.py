@@ -285,13 +285,10 @@ def outcome_cells(run: Run, _: Profile) -> tuple[str, ...]:
     ends = run.table["termination"].to_pylist()
     cells = [f"{100 * (ends.count(how) / len(ends)):.1f}" for how in TERMINATIONS]
     cells.append(f"{run.episodes['n_actions'].mean():.1f}")
-    for name, form in (
-        ("n_refused", ",.0f"), ("n_invalid", ",.0f"), ("n_requests", ",.0f"), ("input_tokens", ",.0f"),
-        ("output_tokens", ",.0f"), ("cost_usd", ",.2f"),
-    ):  # fmt: skip
-        column = run.table[name]
+    for name in ("n_refused", "n_invalid", "n_requests", "input_tokens", "output_tokens", "cost_usd"):
+        column, digits = run.table[name], 2 if name == "cost_usd" else 0
         # A sum is not known where any episode does not know its part.
-        cells.append(NONE if column.null_count else f"{math.fsum(column.to_pylist()):{form}}")
+        cells.append(NONE if column.null_count else f"{math.fsum(column.to_pylist()):,.{digits}f}")
     return tuple(cells)
 
 

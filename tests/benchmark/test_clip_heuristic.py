@@ -62,14 +62,11 @@ def test_it_moves_towards_the_view_that_fits_the_goal(clip):
     assert done(begun(clip, image=plain(BLUE)), front=RED, right=BLUE) == "MoveRight1"
 
 
-def test_it_does_not_go_back_sideways_where_it_came_from(clip):
+def test_it_does_not_go_back_sideways_and_moves_down_only_where_nothing_is_near(clip):
     agent = begun(clip)
     assert done(agent, left=RED) == "MoveLeft1"
     assert done(agent, right=RED, front=REDDISH) == "MoveForward1"
     assert done(agent, right=RED, front=REDDISH) == "MoveRight1"
-
-
-def test_it_moves_down_only_where_nothing_is_near(clip):
     for depth_m, action in ((40.0, "MoveDown1"), (0.0, "MoveDown1"), (5.0, "MoveForward1")):
         assert done(begun(clip), down=RED, front=REDDISH, depth_m=depth_m) == action
 

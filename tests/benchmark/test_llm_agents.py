@@ -114,13 +114,10 @@ def test_what_cannot_be_read_is_said_never_guessed(protocol):
     assert "- step 0: none (the answer could not be read)" in texts_of(service.requests[-1])
 
 
-@pytest.mark.parametrize(("protocol", "error"), [("openai", AgentUnavailable), ("anthropic", InvalidAnswer)])
-def test_an_answer_that_the_filter_took_is_the_services(protocol, error):
-    with serving(Filtered()) as service, pytest.raises(error):
-        begun(protocol, service).act(observation())
-
-
-def test_what_is_no_count_is_none():
+def test_an_answer_that_the_filter_took_and_what_is_no_count():
+    for name, error in (("openai", AgentUnavailable), ("anthropic", InvalidAnswer)):
+        with serving(Filtered()) as service, pytest.raises(error):
+            begun(name, service).act(observation())
     bad = Raw(b'{"choices": [{"message": {"content": "x"}}], "usage": {"prompt_tokens": 1e400}}')
     with serving(bad) as service:
         agent = begun("openai", service)
@@ -223,7 +220,6 @@ def test_keys_come_from_the_environment(protocol, monkeypatch):
         ({"model": "m", "modle": "x"}, "unknown key 'modle': did you mean 'model'"),
         ({"model": "m", "temperature": 3}, "temperature"),
         ({"model": "m", "base_url": "ftp://x/v1"}, "base_url.*not a URL"),
-        ({"model": "m", "base_url": "http://[::1/v1"}, "base_url.*not a URL"),
         ({"model": "m", "base_url": "https://user:pw@x/v1"}, "base_url.*keys come from the environment"),
         ({"model": "m", "base_url": "https://x/v1?key=1"}, "base_url.*keys come from the environment"),
     ],

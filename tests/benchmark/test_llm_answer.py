@@ -36,22 +36,18 @@ def test_wrappings_that_are_not_part_of_the_answer_come_off(text):
     [
         ("", "it is empty"),
         ("Stop", "not one JSON object"),
-        ('I would go on: {"action": "Stop"}', "not one JSON object"),
         ('{"action": "Stop"} That is all.', "not one JSON object"),
         ('["Stop"]', "JSON, but no object: list"),
         ("{}", "action: Field required"),
         ('{"action": 0}', "action: Input should be a valid string"),
         ('{"action": "stop"}', "'stop' is none of the actions"),
-        ('{"action": "Approach"}', "'Approach' is none of the actions"),
         ('{"action": "Stop", "confidence": 1}', "confidence: Extra inputs are not permitted"),
         ('{"action": "Stop", "action": "MoveUp1"}', "duplicate key"),
         ("[" * 10_000, "not one JSON object"),
-        ('{"a":' * 3_000 + "1" + "}" * 3_000, "not one JSON object|a: Extra inputs"),
         ('{"thought": ' + "9" * 5_000 + ', "action": "Stop"}', "not one JSON object .*digits"),
         ('{"thought": 1e999, "action": "Stop"}', "thought: Input should be a valid string"),
         ('{"thought": NaN, "action": "Stop"}', "NaN is no number of JSON"),
         ('{"thought": "\\ud800", "action": "Stop"}', "half of a surrogate pair|valid string"),
-        ('{"action": "\\udfff"}', "surrogate|none of the actions|valid string"),
         ('{"\\ud800": 1, "action": "Stop"}', "Extra inputs|surrogate|valid string"),
         (" " * 20_001, "20,001 characters"),
     ],
@@ -108,14 +104,11 @@ def test_the_papers_eight_actions_have_common_magnitudes():
     assert 'Call the tool "act"' in system_prompt(SEMANTIC, options, "tool")
 
 
-def test_the_goal_is_told_as_its_modality_has_it():
+def test_the_goal_is_told_as_its_modality_has_it_and_a_step_tells_the_budget_the_history_and_a_refusal():
     assert goal_text(SEMANTIC).endswith("Description: A red van by a hedge.")
     for goal in (SEMANTIC, IMAGE):
         assert "TARGET: red van. It lies northeast of the landmark nearest to it: clock tower." in goal_text(goal)
     assert "None" not in goal_text(IMAGE)
-
-
-def test_a_step_tells_the_budget_the_history_and_a_refusal():
     turns = [Turn(5, "MoveUp1", "Higher."), Turn(6, None)]
     said = step_text(Observation(7, 173, refused=True), turns)
     assert "- step 5: MoveUp1. Higher." in said

@@ -18,7 +18,7 @@ from aerialdojo_gen.base.table_formats import as_text
 from aerialdojo_gen.base.text_table import BEST, SECOND
 from aerialdojo_gen.benchmark import paired, registry, tables
 from aerialdojo_gen.benchmark.metrics import PROFILES, bootstrap, summarize
-from aerialdojo_gen.benchmark.runs import group_runs, load_runs, with_baselines
+from aerialdojo_gen.benchmark.runs import group_runs, load_runs, mark_adapted, with_baselines
 from aerialdojo_gen.benchmark.tables import ReportRequest
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
@@ -180,6 +180,10 @@ def test_tables_of_parts(runs, log):
     assert (partition[0], partition[5], partition[10]) == ("18.75", "25.00", "+6.25")
     # OSR ¼, 1, 1, 1 and ½, 0, 1, 0.
     assert (partition[1], partition[6], partition[11]) == ("81.25", "37.50", "−43.75")
+    # Of scenes that the agent was trained on, Coast_1 and Harbor_1 say 0 and 1: they are no longer OOD.
+    options = '{"trained_on": ["N_Coast_1", "I_Harbor_1", "U_Mall_0"]}'
+    trained = replace(runs[0], table=mark_adapted(runs[0].table, options))
+    assert cells(made("partition", [trained]), "package:Alpha")[::5] == ("18.75", "0.00", "50.00", "−18.75")
     # Semantic goals: Mall_0 1 of 2, Coast_0 1, Harbor_1 1; image goals: Harbor_1 1.
     goal = cells(made("goal", runs), "package:Alpha")
     assert (goal[0], goal[5], goal[10]) == ("31.25", "12.50", "−18.75")

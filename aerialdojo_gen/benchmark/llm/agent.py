@@ -15,7 +15,7 @@ from pydantic import ValidationError
 
 from aerialdojo_gen.base.errors import AerialDojoError, AgentUnavailable, ServiceDown, UsageError
 from aerialdojo_gen.base.explain import explain
-from aerialdojo_gen.base.llm_client import Connection
+from aerialdojo_gen.base.llm_client import Connection, Meter
 from aerialdojo_gen.base.pictures import Picture, colour_picture, depth_picture
 from aerialdojo_gen.base.secrets import Secrets
 from aerialdojo_gen.benchmark.agents.base import AgentBase, InvalidAnswer, Usage
@@ -102,20 +102,12 @@ class LanguageModelAgent(AgentBase, ABC):
         self.tells_tokens = True
         self._asked = False  # Whether `ask_for` has settled the form
         self.sensors = Sensors(o.views, depth=o.depth, width=o.image_size_px, height=o.image_size_px)
+        self.pace: Callable[[], object] = lambda: None  # Called before each request; waits until one may be sent
         self.service = Connection(
             self.package, o.base_url, o.timeout_s, o.request_retries, secrets=self._secrets, key_variable=o.key_env,
-            model=o.model,
+            model=o.model, pace=lambda: self.pace(),
         )  # fmt: skip
         self._begin()
-
-    @property
-    def pace(self) -> Callable[[], None] | None:
-        """Called before each request; waits until one may be sent."""
-        return self.service.meter.pace
-
-    @pace.setter
-    def pace(self, pace: Callable[[], None] | None) -> None:
-        self.service.meter.pace = pace
 
     def close(self) -> None:
         """Close the connections."""
@@ -239,7 +231,7 @@ class LanguageModelAgent(AgentBase, ABC):
         self._seen: deque[tuple[int, Picture]] = deque(maxlen=self.options.history_images)
         self._tokens: list[int | None] = [0, 0]
         self._answer: str | None = None
-        self.service.meter.reset()
+        self.service.meter = Meter()
 
     def act(self, observation: Observation) -> int:
         """Ask for an action."""
