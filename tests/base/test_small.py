@@ -80,3 +80,5 @@ def test_the_working_directory_is_no_password(name, monkeypatch):
     monkeypatch.setenv("DATABASE_PWD", "long-secret-word")
     said = Secrets().text("/home/someone/project/agent.py: long-secret-word")
     assert said == f"/home/someone/project/agent.py: {REDACTED}"
+    options = {"note": "https://me:hunter2@example.org/v1?api_key=abc123"}
+    assert Secrets(options).options(options) == {"note": f"https://{REDACTED}@example.org/v1?api_key={REDACTED}"}

@@ -235,14 +235,6 @@ def test_a_run_is_not_gone_on_with_by_other_code(smoke, tmp_path, monkeypatch):
         evaluate(smoke, flyer, out=tmp_path / "out")
 
 
-def test_keys_among_an_agents_options_are_not_logged():
-    mine = job("mine:Agent", options={"note": "https://me:hunter2@example.org/v1?api_key=abc123"})
-    logged = json.dumps(mine.settings()) + mine.identity()["agent_options"]
-    assert logged.count("[redacted]@example.org") == 2
-    assert "hunter2" not in logged
-    assert "abc123" not in logged
-
-
 def test_infrastructure_failures_are_tried_again_and_logged_apart(smoke, tmp_path):
     Flaky.left = 2
     outcome = evaluate(smoke, job(FLAKY, limit=3), out=tmp_path)
