@@ -120,10 +120,9 @@ def _along_way(request: ReportRequest) -> bool:
 def _by_radius(request: ReportRequest) -> list[Cell]:
     radii = sorted(set(request.radii_m))
     at = {r: Cut(profile=at_radius(request.profiles[0], r)) for r in radii}
-    cells = [Cell("SR ↑", "sr", at[r], f"{r:g} m") for r in radii]
-    cells += [Cell("OSR, at poses ↑", "osr", at[r], f"{r:g} m") for r in radii]
-    if _along_way(request):
-        cells += [Cell("OSR, along the way ↑", "osr", at[r] | Cut(along_way=True), f"{r:g} m") for r in radii]
+    rates = [("SR ↑", "sr", Cut()), ("OSR, at poses ↑", "osr", Cut())]
+    rates += [("OSR, along the way ↑", "osr", Cut(along_way=True))] if _along_way(request) else []
+    cells = [Cell(head, name, at[r] | how, f"{r:g} m") for head, name, how in rates for r in radii]
     cells += [
         Cell("SR gain, points", "sr", at[far], f"{near:g}→{far:g} m", ("sr", at[near]))
         for near, far in pairwise(radii)
@@ -139,11 +138,8 @@ def _radius_notes(request: ReportRequest) -> list[str]:
     for section in dict.fromkeys(row.section for row in rows):
         for near, far in pairwise(sorted(set(request.radii_m))):
             at = [Cut(profile=at_radius(request.profiles[0], radius)) for radius in (near, far)]
-            rates = [
-                (row.label, request.score(at[0] | row.cut).sr, request.score(at[1] | row.cut).sr)
-                for row in rows
-                if row.section == section
-            ]
+            own = [row for row in rows if row.section == section]
+            rates = [(row.label, *(request.score(cut | row.cut).sr for cut in at)) for row in own]
             # Differences in the last digits are sums in another order.
             turned = [
                 f"{up} overtakes {down}"
@@ -153,18 +149,16 @@ def _radius_notes(request: ReportRequest) -> list[str]:
             ]
             if turned:
                 more = f", and {len(turned) - _MAX_REVERSALS} more" if len(turned) > _MAX_REVERSALS else ""
-                said = f"{', '.join(turned[:_MAX_REVERSALS])}{more}."
-                notes.append(f"{section}, from {near:g} to {far:g} m: {said}")
+                listed = ", ".join(turned[:_MAX_REVERSALS])
+                notes.append(f"{section}, from {near:g} to {far:g} m: {listed}{more}.")
     return notes
 
 
 def _adapted_notes(runs: Sequence[Run]) -> list[str]:
     """Name the runs whose agents were trained on OOD scenes."""
     scenes = {run.label: len(set(run.episodes["scene"][run.episodes["partition"] == ADAPTED])) for run in runs}
-    said = [f"{label}, {n} scene{'s' * (n > 1)}" for label, n in scenes.items() if n]
-    return (
-        [f"{ADAPTED}: OOD scenes whose training tasks the agent was trained on: {'; '.join(said)}."] if said else []
-    )
+    listed = "; ".join(f"{label}, {n} scene{'s' * (n > 1)}" for label, n in scenes.items() if n)
+    return [f"{ADAPTED}: OOD scenes whose training tasks the agent was trained on: {listed}."] if listed else []
 
 
 def caveats(runs: Sequence[Run]) -> list[str]:
