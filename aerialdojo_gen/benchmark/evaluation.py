@@ -140,7 +140,7 @@ class Limits:
 
     def failing(self, total: Finished) -> str:
         """Return the kind of failure that has occurred too often in a row; empty if there is none."""
-        last = total.streak[-self.failures_in_row :]
+        last = [failed.kind for failed in total.streak[-self.failures_in_row :]]
         return last[-1] if len(last) == self.failures_in_row and len(set(last)) == 1 else ""
 
 

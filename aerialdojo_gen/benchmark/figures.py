@@ -120,7 +120,7 @@ def family_radars(runs: Sequence[Run], profile: Profile, paper_axes: bool = Fals
     curves, ends, note = _curves(runs, profile, paper_axes)
     tips, middle = [], []
     for metric, end in zip(PAPER_METRICS, ends, strict=True):
-        label, outer, inner = MEASURES[metric].head[:-2], *((0, end) if metric in _INWARDS else (end, 0))
+        label, (inner, outer) = MEASURES[metric].head[:-2], sorted((0.0, end), reverse=metric in _INWARDS)
         tips.append(f"{label}\n{outer:g} {_UNITS[metric]}")
         middle.append(f"{label} {inner:g} {_UNITS[metric]}")
     with _styled((6.8, 7.0)) as figure:

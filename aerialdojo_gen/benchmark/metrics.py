@@ -115,7 +115,10 @@ def episodes_of(table: pa.Table) -> Episodes:
         if (columns[f"min_{where}distance_m"] > columns[f"final_{where}distance_m"] + 1e-9).any():
             raise StoreError("episodes: a smallest distance exceeds the last one: run the evaluation again")
     columns["view_distance_m"] = np.array(seen, dtype=np.float64)
-    return np.rec.fromarrays(list(columns.values()), names=list(columns)).view(np.ndarray)
+    episodes = np.empty(table.num_rows, [(name, column.dtype) for name, column in columns.items()])
+    for name, column in columns.items():
+        episodes[name] = column
+    return episodes
 
 
 class Outcomes(NamedTuple):

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pyarrow as pa
 import pyarrow.compute as pc
@@ -140,6 +140,13 @@ class WorkUnit:
         return f"evaluate {self.scene}"
 
 
+class Failed(NamedTuple):
+    """Why an episode failed, for reasons outside the agent's choices."""
+
+    kind: str
+    reason: str
+
+
 @dataclass(frozen=True)
 class Finished:
     """Counts of finished episodes, for progress and budget."""
@@ -149,7 +156,7 @@ class Finished:
     cost_usd: float = 0.0  # 0 if unknown, as tokens are
     tokens: int = 0
     flown: int = 0  # Episodes that did not fail
-    streak: tuple[str, ...] = ()  # Kinds of the failures since the last episode that did not fail
+    streak: tuple[Failed, ...] = ()  # Failures since the last episode that did not fail
 
     def __add__(self, other: Finished) -> Finished:
         """Add later episodes."""
@@ -203,29 +210,28 @@ class Worker:
     def _finish(self, task: Task, stopped: Callable[[], bool]) -> tuple[dict[str, Any], Finished] | None:
         """Fly one episode, with retries after external failures; None if the run is stopped meanwhile."""
         used: Usage | None = None
-        kind = reason = ""
-        record, attempt, again = None, 0, True
+        record, failed, attempt, again = None, Failed("", ""), 0, True
         while record is None and again and attempt < self._retry_policy.attempts:
             attempt += 1
             try:
                 record = self._episode(task)
             except AgentUnavailable as error:
                 used = _add_usage(used, self._guarded.usage())
-                kind, reason, again = error.kind, self._line(error), error.again
+                failed, again = Failed(error.kind, self._line(error)), error.again
                 left = again and attempt < self._retry_policy.attempts
                 if left and not self._pause(attempt, error.retry_after_s, stopped):
                     return None
             except AgentError as error:
                 if not self._retry_policy.tolerate:
                     raise
-                kind, reason, again = "agent error", self._line(error), False
+                failed, again = Failed("agent error", self._line(error)), False
         if record is not None:
             used = _add_usage(used, self._guarded.usage())
         tokens = (used.input_tokens or 0) + (used.output_tokens or 0) if used else 0
         spent = Finished(1, cost_usd=used.cost_usd or 0.0 if used else 0.0, tokens=tokens)
         if record is None:
-            row = self._key(task) | {"attempts": attempt, "kind": kind, "reason": reason} | _usage_columns(used)
-            return {"task_id": task.row["task_id"], "failure": row}, replace(spent, streak=(kind,))
+            row = self._key(task) | {"attempts": attempt} | failed._asdict() | _usage_columns(used)
+            return {"task_id": task.row["task_id"], "failure": row}, replace(spent, streak=(failed,))
         record["episode"] |= _usage_columns(used)
         times = {name: getattr(used, name, None) for name in ("request_s", "longest_request_s")}
         record["timing"] |= {"attempts": attempt} | times

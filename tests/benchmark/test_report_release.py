@@ -63,7 +63,7 @@ def test_every_part_is_the_one_that_a_join_finds(planted):
     (run,) = runs = flown_at_random(planted.data)
     rows = facts(planted, run)
     request = ReportRequest(open_root(planted.data), runs, [AT_3])
-    assert request.breakdowns.missing == ()
+    assert request.breakdowns.missing == []
     assert request.breakdowns.missing_note == ""
     expected = {
         "plan_detour": pd.cut(rows.plan_detour, [-np.inf, 1.05, 1.2, 1.5, np.inf], right=False,
