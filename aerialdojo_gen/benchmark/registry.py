@@ -139,7 +139,7 @@ def _radius_notes(request: ReportRequest) -> list[str]:
         for near, far in pairwise(sorted(set(request.radii_m))):
             at = [Cut(profile=at_radius(request.profiles[0], radius)) for radius in (near, far)]
             own = [row for row in rows if row.section == section]
-            rates = [(row.label, *(request.score(cut | row.cut).sr for cut in at)) for row in own]
+            rates = [(row.label, request.score(at[0] | row.cut).sr, request.score(at[1] | row.cut).sr) for row in own]
             # Differences in the last digits are sums in another order.
             turned = [
                 f"{up} overtakes {down}"
