@@ -233,8 +233,8 @@ class Worker:
             row = self._key(task) | {"attempts": attempt} | failed._asdict() | _usage_columns(used)
             return {"task_id": task.row["task_id"], "failure": row}, replace(spent, streak=(failed,))
         record["episode"] |= _usage_columns(used)
-        times = {name: getattr(used, name, None) for name in ("request_s", "longest_request_s")}
-        record["timing"] |= {"attempts": attempt} | times
+        times = (used.request_s, used.longest_request_s) if used else (None, None)
+        record["timing"] |= {"attempts": attempt, "request_s": times[0], "longest_request_s": times[1]}
         return record, replace(spent, actions=record["episode"]["n_actions"], flown=1)
 
     def _pause(self, attempt: int, requested_s: float | None, stopped: Callable[[], bool]) -> bool:
