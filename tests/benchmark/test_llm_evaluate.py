@@ -101,7 +101,7 @@ def test_a_failing_service_is_logged_apart_and_its_episodes_flown_again(smoke, t
 
 
 CONTEXT = "This model's maximum context length is 4096 tokens, your messages have 5000"
-# Kinds of failure of a service, by the number of the episode that it strikes; test_llm_failures.py has each.
+# Kinds of failure of a service, by the number of the episode that it strikes; test_llm_agents.py has each.
 STRUCK = {
     2: (Status(400, "blocked", {}, "content_filter"), "content filter"),
     4: (Status(400, CONTEXT), "context too long"),
