@@ -78,7 +78,7 @@ def test_every_part_is_the_one_that_a_join_finds(planted):
             {0: "neither", 1: "start alone", 2: "target alone", 3: "target and start"}
         ),
     }  # fmt: skip
-    found = {breakdown.name: breakdown for breakdown in request.breakdowns.found}
+    found = request.breakdowns.found
     assert found.keys() == {*expected, "detour_ratio"}
     for name, wanted in expected.items():
         assert set(found[name].parts) == set(wanted.unique()), name
