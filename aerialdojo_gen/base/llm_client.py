@@ -131,7 +131,7 @@ class Connection:
             failure = AgentUnavailable(message, kind="time-out")
         except BodyBoundError as error:
             # One of the packages wraps what its client raises, the other lets it through.
-            failure = self._bound(error)
+            failure = self.unusable(self.clean(str(error)))
         finally:
             # Ctrl-C leaves the request unfinished.
             future.cancel()
@@ -144,13 +144,10 @@ class Connection:
 
     def not_understood(self, what: str) -> AgentUnavailable:
         """Make the error for an answer that is not what the protocol says."""
-        return self._refused(f"its answer is no {what}: is base_url right?", "malformed answer")
+        return self.unusable(f"its answer is no {what}: is base_url right?")
 
-    def filtered(self) -> AgentUnavailable:
-        """Make the error for an answer that the service's content filter has taken away."""
-        return self._refused("its content filter took the answer away", "content filter")
-
-    def _refused(self, why: str, kind: str) -> AgentUnavailable:
+    def unusable(self, why: str, kind: str = "malformed answer") -> AgentUnavailable:
+        """Make the error for an answer that would be the same if it was asked for again."""
         return AgentUnavailable(f"{self.name}: {why}", kind=kind, again=False)
 
     def clean(self, text: str) -> str:
@@ -166,23 +163,38 @@ class Connection:
             closing = asyncio.run_coroutine_threadsafe(self.client.close(), self._loop)
             closing.add_done_callback(lambda _: self._loop.stop())
 
-    def _bound(self, error: BodyBoundError) -> AgentUnavailable:
-        return self._refused(self.clean(str(error)), "malformed answer")
-
     def _failure(self, error: Any) -> AerialDojoError:
         if isinstance(error, self._package.APIStatusError):
-            body = getattr(error, "body", None)
-            message = self._line(body or error.message)
-            after_s = retry_after_s(error.response.headers)
-            return refusal(error.status_code, body, message, self.name, self._model, after_s)
+            return self._refusal(error.status_code, error)
         cause = error.__cause__ or error
         if isinstance(cause, BodyBoundError):
-            return self._bound(cause)
+            return self.unusable(self.clean(str(cause)))
         message = self._line(str(cause) or type(cause).__name__)
         if type(cause).__name__ in _NO_ROUTE:
             message = _system_error(cause) or message
             return ServiceDown(f"{self.name}: {message}: is the service there, and is base_url right?")
         return AgentUnavailable(f"{self.name}: {message}", kind="connection lost")
+
+    def _refusal(self, status: int, error: Any) -> AerialDojoError:
+        """Make the error for an HTTP status that is none of success."""
+        body = getattr(error, "body", None)
+        text, after_s = self._line(body or error.message), retry_after_s(error.response.headers)
+        message, words = f"{self.name}: HTTP {status}: {text}", f"{_codes(body)} {text}".lower()
+        if status in (401, 402, 403, 407) or 300 <= status < 400 or _ALL_REQUESTS.search(words):
+            return UsageError(message)
+        if status in _RETRYABLE or status >= 500:
+            return AgentUnavailable(message, after_s, kind=_RETRYABLE.get(status, "server error"))
+        model = rf"(?<!\w){re.escape(self._model.lower())}(?!\w)" if self._model else "model_not_found"
+        # A 404 may be the model's or the address's, or that of something in the request.
+        if status == 404 and (re.search(f"{model}|model_not_found", words) or not _PICTURE_WORDS.search(words)):
+            return UsageError(message)
+        if _FILTERED.search(words):
+            kind = "content filter"
+        elif status == 413 or _TOO_LONG.search(words):
+            kind = "context too long"
+        else:
+            kind = "not found" if status == 404 else "bad request"
+        return AgentUnavailable(message, after_s, kind=kind, again=False)
 
     def _line(self, value: Any) -> str:
         if isinstance(value, dict):
@@ -298,45 +310,17 @@ def retry_after_s(headers: Mapping[str, str]) -> float | None:
 
 
 _RETRYABLE = {408: "time-out", 409: "conflict", 425: "too early", 429: "rate limit"}
-# A wrong or missing key, no money, no permission, and redirects: the key must not go elsewhere.
-_ALL_REQUESTS = (401, 402, 403, 407)
-_NO_MONEY = ("insufficient_quota", "billing_", "credit balance", "insufficient credits", "insufficient balance")
-_NO_KEY = ("api key not valid", "api_key_invalid", "invalid api key", "incorrect api key")
-_FILTERED = ("content_filter", "content filter", "content_policy", "content policy", "responsibleai", "safety")
-_TOO_LONG = ("context_length", "context length", "context window", "maximum context", "prompt is too long",
-             "too many tokens", "max_model_len", "input is too long")  # fmt: skip
-_PICTURE_WORDS = ("image", "picture", "media", "file")
-
-
-def refusal(status: int, body: Any, text: str, name: str, model: str, retry_after_s: float | None) -> AerialDojoError:
-    """Make the error for an HTTP status that is none of success."""
-    message = f"{name}: HTTP {status}: {text}"
-    words = f"{_codes(body)} {text}".lower()
-    if status in _ALL_REQUESTS or 300 <= status < 400 or _has(words, _NO_MONEY) or _has(words, _NO_KEY):
-        return UsageError(message)
-    if status in _RETRYABLE or status >= 500:
-        kind = _RETRYABLE.get(status, "server error")
-        return AgentUnavailable(message, retry_after_s, kind=kind)
-    if status == 404 and _concerns_all_requests(words, model):
-        return UsageError(message)
-    if _has(words, _FILTERED):
-        kind = "content filter"
-    elif status == 413 or _has(words, _TOO_LONG):
-        kind = "context too long"
-    else:
-        kind = "not found" if status == 404 else "bad request"
-    return AgentUnavailable(message, retry_after_s, kind=kind, again=False)
-
-
-def _concerns_all_requests(words: str, model: str) -> bool:
-    """Whether a 404 is the model's or the address's, rather than that of something in the request."""
-    if "model_not_found" in words or (model and re.search(rf"(?<!\w){re.escape(model.lower())}(?!\w)", words)):
-        return True
-    return not _has(words, _PICTURE_WORDS)
-
-
-def _has(words: str, any_of: tuple[str, ...]) -> bool:
-    return any(word in words for word in any_of)
+# A wrong or missing key and no money, as no permission and redirects: the key must not go elsewhere.
+_ALL_REQUESTS = re.compile(
+    "insufficient_quota|billing_|credit balance|insufficient credits|insufficient balance|"
+    "api key not valid|api_key_invalid|invalid api key|incorrect api key"
+)
+_FILTERED = re.compile("content_filter|content filter|content_policy|content policy|responsibleai|safety")
+_TOO_LONG = re.compile(
+    "context_length|context length|context window|maximum context|prompt is too long|too many tokens|max_model_len|"
+    "input is too long"
+)
+_PICTURE_WORDS = re.compile("image|picture|media|file")
 
 
 def _codes(body: Any) -> str:

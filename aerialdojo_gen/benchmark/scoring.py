@@ -210,12 +210,13 @@ def _check_replay(file: Path, submission: Submission, found: Logged) -> None:
     if faults:
         raise SubmissionRefused(f"{file} is refused: {len(faults):,} of {len(place):,} episodes do not replay; "
                                 f"{faults[0]}")  # fmt: skip
-    for metric, is_so in (found.metrics or {}).items():
+    for metric, measured in (found.metrics or {}).items():
         if submission.metrics is None:
             return
-        said = submission.metrics.get(metric)
-        if (said is None) != (is_so is None) or (said is not None and abs(said - (is_so or 0.0)) > _TOLERANCE):
-            shown = [text(metric, math.nan if value is None else value) for value in (said, is_so)]
+        claimed = submission.metrics.get(metric)
+        off = abs((claimed or 0.0) - (measured or 0.0))
+        if (claimed is None) != (measured is None) or off > _TOLERANCE:
+            shown = [text(metric, math.nan if value is None else value) for value in (claimed, measured)]
             raise SubmissionRefused(
                 f"{file} is refused: it claims {metric} = {shown[0]}, and its actions give {shown[1]}"
             )
@@ -223,18 +224,18 @@ def _check_replay(file: Path, submission: Submission, found: Logged) -> None:
 
 def _fault(theirs: Flown, i: int, own: Flown, k: int) -> str:
     """Say what of an episode does not come out; empty where all does."""
-    said, done = len(theirs.actions[i]), len(own.actions[k])
-    if done > said:
-        return f"its {said} actions do not end it"
-    if done < said:
-        return f"it ends by {own.termination[k]} after {done} of its {said} actions"
+    claimed, flown = len(theirs.actions[i]), len(own.actions[k])
+    if flown > claimed:
+        return f"its {claimed} actions do not end it"
+    if flown < claimed:
+        return f"it ends by {own.termination[k]} after {flown} of its {claimed} actions"
     if theirs.termination[i] != own.termination[k]:
         return f"it ends by {own.termination[k]}, not by {theirs.termination[i]}"
     for name in ("x_m", "y_m", "z_m", "yaw_rad", "path_length_m"):
         claim, value = getattr(theirs, name)[i], getattr(own, name)[k]
-        apart = abs(claim - value)
+        off = abs(claim - value)
         # Half a turn has two names.
-        if min(apart, abs(math.tau - apart)) > _TOLERANCE if name == "yaw_rad" else apart > _TOLERANCE:
+        if min(off, abs(math.tau - off)) > _TOLERANCE if name == "yaw_rad" else off > _TOLERANCE:
             return f"it ends with {name} = {value:.3f}, not {claim:.3f}"
     return ""
 

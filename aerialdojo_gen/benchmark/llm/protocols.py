@@ -36,7 +36,7 @@ class OpenAIAgent(LanguageModelAgent):
         if message is None or not (content is None or isinstance(content, str)):
             raise self.service.not_understood("chat completion")
         if not content and getattr(choice, "finish_reason", None) == "content_filter":
-            raise self.service.filtered()
+            raise self.service.unusable("its content filter took the answer away", "content filter")
         calls = getattr(message, "tool_calls", None)
         function = getattr(calls[0], "function", None) if isinstance(calls, list) and calls else None
         arguments = getattr(function, "arguments", None)
