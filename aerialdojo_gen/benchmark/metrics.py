@@ -103,7 +103,7 @@ def episodes_of(table: pa.Table) -> Episodes:
         table[name].to_pylist() if name in table.column_names else [None] * table.num_rows
         for name in ("viewpoint_distance_m", "target_in_sight")
     )
-    seen = [np.nan if d is None or s is None else d if s else np.inf for d, s in zip(distance, sight, strict=True)]
+    views = [np.nan if d is None or s is None else d if s else np.inf for d, s in zip(distance, sight, strict=True)]
     if np.isnan(columns["euclidean_m"]).any():
         raise StoreError(
             "these episodes have no scores: the release withholds the goals; its owner scores a submission"
@@ -114,7 +114,7 @@ def episodes_of(table: pa.Table) -> Episodes:
     for where in ("", "horizontal_"):
         if (columns[f"min_{where}distance_m"] > columns[f"final_{where}distance_m"] + 1e-9).any():
             raise StoreError("episodes: a smallest distance exceeds the last one: run the evaluation again")
-    columns["view_distance_m"] = np.array(seen, dtype=np.float64)
+    columns["view_distance_m"] = np.array(views, dtype=np.float64)
     episodes = np.empty(table.num_rows, [(name, column.dtype) for name, column in columns.items()])
     for name, column in columns.items():
         episodes[name] = column

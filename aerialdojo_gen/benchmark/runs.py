@@ -114,10 +114,10 @@ def load_runs(data: Where, names: Sequence[str] = (), sample: Sample | None = No
             said = f", and {failed:,} that failed: fly them again with" if failed else ": run"
             rerun_command = command("evaluate", run=name, protocol=sample and "paper", rerun_failed=bool(failed))
             raise StoreError(f"run {name!r} has no finished episode{of}{said} {rerun_command}")
-        agent, options, told = (table[column][0].as_py() for column in ("agent", "agent_options", "told"))
+        agent, options, hints = (table[column][0].as_py() for column in ("agent", "agent_options", "told"))
         # With hints it is another contender.
-        label = f"{agent} + {told}" if told else agent
-        loaded.append(Run(name, label, agent, options, mark_adapted(table, options), failed, root, hints=told or ""))
+        label = f"{agent} + {hints}" if hints else agent
+        loaded.append(Run(name, label, agent, options, mark_adapted(table, options), failed, root, hints=hints or ""))
     if not loaded:
         what = "no runs" if sample is None else f"no episodes{of}"
         raise StoreError(f"{what} in {root}: run {command('evaluate', protocol=sample and 'paper')}")

@@ -38,7 +38,7 @@ from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store.schemas import APPROACH, MOVE_UP_1, STOP
 from aerialdojo_gen.store.schemas.columns import list_of
 
-EYES = Sensors(("front", "left", "right"), rgb=False, width=48, height=48)
+CAMERAS = Sensors(("front", "left", "right"), rgb=False, width=48, height=48)
 
 
 def goal(budget=90, name="red van", image=None, sensors=BLIND):
@@ -75,7 +75,7 @@ class Typed(AgentBase):
         ("no_such_module_here:Agent", {}, "cannot load agent .* No module named"),
         (f"{__name__}:Missing", {}, f"module {__name__} has no Missing"),
         (f"{__name__}:Nothing", {}, "it needs reset"),
-        (f"{__name__}:EYES", {}, "EYES is no class"),
+        (f"{__name__}:CAMERAS", {}, "CAMERAS is no class"),
         ("random", {"sead": 1}, "its options: seed, stop_probability"),
         ("random", {"stop_probability": 2}, "between 0 and 1"),
         ("constant", {"actions": "MoveForward5,MoveBack1"}, "no action 'MoveBack1': there are Stop, MoveForward1, "),
@@ -151,16 +151,16 @@ class Seer:
 
     def __init__(self, space):
         self._caster = RayCaster(space.scene)
-        self._rays = EYES.camera.rays().reshape(-1, 3)
+        self._rays = CAMERAS.camera.rays().reshape(-1, 3)
 
     def look(self, episode, rgb=None):
         depth = {}
-        for view in EYES.views:
+        for view in CAMERAS.views:
             pose = view_pose(episode.position, episode.yaw_rad, view)
             along = self._caster.first_hit(pose[:3, 3], self._rays @ pose[:3, :3].T)[0]
             planar = along / np.linalg.norm(self._rays, axis=1)
-            planar = np.where(planar <= EYES.max_depth_m, planar, 0.0).astype(np.float32)
-            depth[view] = planar.reshape(EYES.height, EYES.width)
+            planar = np.where(planar <= CAMERAS.max_depth_m, planar, 0.0).astype(np.float32)
+            depth[view] = planar.reshape(CAMERAS.height, CAMERAS.width)
         return Observation(episode.n_actions, episode.remaining_actions, episode.refused, rgb or {}, depth)
 
 
@@ -168,7 +168,7 @@ def test_the_map_knows_a_wall_from_the_open():
     wall = instance("wall", box((5, -9, 0), (6, 9, 6)))
     space = FlightSpace(scene(wall, half=12.0, ceiling=8.0), 0.25)
     episode = Episode(space, (0.0, 0.0, 3.0, 0.0), (9.0, 0.0, 3.0), 90)
-    drawn = DepthMap(EYES)
+    drawn = DepthMap(CAMERAS)
     for view, depth in Seer(space).look(episode).depth_m.items():
         drawn.add(view, depth, 0.0, 0.0, 0.0)
     occupied = np.argwhere(drawn._cells == 2)
@@ -191,7 +191,7 @@ def test_the_explorer_flies_on_and_touches_nothing(village):
             continue
         episode = Episode(village, (*start, 0.7 * k), (50.0, 50.0, 2.0), 60)
         agent = ExplorerAgent()
-        agent.reset(goal(60, sensors=EYES))
+        agent.reset(goal(60, sensors=CAMERAS))
         while episode.termination is None:
             episode.step(agent.act(seer.look(episode)))
         assert (episode.termination, episode.n_actions) == ("stop", 60), "the last action is a Stop"
@@ -208,7 +208,7 @@ def test_the_explorer_stops_where_the_picture_fits(village):
     other = np.random.default_rng(1).integers(0, 255, (48, 48, 3)).astype(np.uint8)
     episode = Episode(village, (0.0, -17.0, 2.0, 0.0), (50.0, 50.0, 2.0), 60)
     agent = ExplorerAgent()
-    agent.reset(goal(60, image=picture, sensors=EYES))
+    agent.reset(goal(60, image=picture, sensors=CAMERAS))
     assert agent.act(Seer(village).look(episode, {"front": other})) != 0
     assert agent.act(Seer(village).look(episode, {"front": picture})) == 0
     with pytest.raises(UsageError, match="front, left and right"):

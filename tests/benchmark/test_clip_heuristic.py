@@ -14,7 +14,7 @@ from aerialdojo_gen.benchmark.episodes import read_run
 from aerialdojo_gen.store.schemas import ACTION_NAMES
 
 RED, REDDISH, GREY, BLUE = (220, 30, 30), (200, 120, 120), (128, 128, 128), (30, 40, 210)
-EYES = Sensors(width=16, height=16)
+CAMERAS = Sensors(width=16, height=16)
 
 
 @pytest.fixture(scope="module")
@@ -27,7 +27,7 @@ def agent_of(clip, **options):
     return load_agent("clip", **paths, **options)
 
 
-def begun(clip, image=None, sensors=EYES, **options):
+def begun(clip, image=None, sensors=CAMERAS, **options):
     """An agent at the start of an episode; it stops at nothing that is not asked for."""
     agent = agent_of(clip, **{"stop": 2.0, "stop_image": 2.0} | options)
     words = None if image is not None else "a red post"

@@ -71,20 +71,20 @@ IMAGE = Goal("image", "red van", "clock tower", "northeast", None, np.zeros((4, 
 
 
 def test_the_prompt_holds_what_appendix_a_asks_for():
-    told = system_prompt(SEMANTIC, Options(model="m"))
+    prompt = system_prompt(SEMANTIC, Options(model="m"))
     for words in (
         *(f"- {name}: " for name in ACTION_NAMES[:APPROACH]), "fly 5 m forward", "turn 15° to the left", "sink 2 m",
         "wheelbase of 0.25 m", "within 3 m", "budget of 180 actions", "black at 0 m to white at 50 m",
         "640 x 640 pixels", "picture of the step before is shown again", json.dumps(SIXTEEN.schema()),
     ):  # fmt: skip
-        assert words in told
-    assert "left (looks" not in told
-    assert "Approach" not in told
+        assert words in prompt
+    assert "left (looks" not in prompt
+    assert "Approach" not in prompt
     assert "depth" not in system_prompt(SEMANTIC, Options(model="m", depth=False))
     assert "shown again" not in system_prompt(SEMANTIC, Options(model="m", history_images=0))
     # Its own example of an answer is one, once the blanks are filled: with any of the actions.
     for k, name in enumerate(ACTION_NAMES[:APPROACH]):
-        example = told.splitlines()[-1].replace("<one name from the list above>", name)
+        example = prompt.splitlines()[-1].replace("<one name from the list above>", name)
         assert SIXTEEN.ids[parse_answer(example).action] == k
 
 
@@ -95,9 +95,9 @@ def test_the_papers_eight_actions_have_common_magnitudes():
         "MoveUp": "MoveUp2", "MoveDown": "MoveDown2", "TurnLeft": "TurnLeft15", "TurnRight": "TurnRight15",
     }  # fmt: skip
     options = Options(model="m", actions="eight", move_m=5, climb_m=2)
-    told = system_prompt(SEMANTIC, options)
-    assert "- MoveForward: fly 5 m forward" in told
-    assert "MoveForward5" not in told
+    prompt = system_prompt(SEMANTIC, options)
+    assert "- MoveForward: fly 5 m forward" in prompt
+    assert "MoveForward5" not in prompt
     assert parse_answer('{"action": "MoveUp"}', actions.names).action == "MoveUp"
     with pytest.raises(InvalidAnswer, match="'MoveUp2' is none of the actions"):
         parse_answer('{"action": "MoveUp2"}', actions.names)

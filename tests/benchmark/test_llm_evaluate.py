@@ -71,9 +71,9 @@ def test_an_evaluation_logs_what_was_said_and_what_it_cost(smoke, tmp_path):
     timings = read_run(tmp_path, "openai", "timings").to_pylist()
     assert all(0 < row["longest_request_s"] <= row["request_s"] <= row["agent_s"] for row in timings)
     # What went out: nothing that the runner alone may know.
-    told = json.dumps([request["body"] for request in service.requests])
+    sent = json.dumps([request["body"] for request in service.requests])
     hidden = [str(value) for name in ("nav_id", "task_id", "start_x_m") for value in episodes[name].to_pylist()]
-    assert not [value for value in ("goal_x_m", *hidden) if value in told]
+    assert not [value for value in ("goal_x_m", *hidden) if value in sent]
 
 
 def test_a_failing_service_is_logged_apart_and_its_episodes_flown_again(smoke, tmp_path):

@@ -1,4 +1,4 @@
-"""The report of a log written by hand: two agents and a floor, four families, both partitions; figures by hand."""
+"""The report of a log written by hand: two agents and a baseline, four families, both partitions; figures by hand."""
 
 import csv
 import io
@@ -80,8 +80,8 @@ def log(tmp_path_factory):
     data = tmp_path_factory.mktemp("known")
     write(data, "alpha", "package:Alpha", LOG["alpha"])
     write(data, "beta", "package:Beta", LOG["beta"])
-    # The floor has flown more than these tasks.
-    write(data, "floor", "stop", LOG["stop"], more="S")
+    # The baseline has flown more than these tasks.
+    write(data, "base", "stop", LOG["stop"], more="S")
     return data
 
 
@@ -99,20 +99,20 @@ def cells(table, label):
     return next(row for name, row in table.rows if name == label)
 
 
-def test_the_floors_that_flew_the_same_tasks_are_added_and_cut_down(log, runs):
+def test_baselines_that_flew_the_same_tasks_are_added_and_cut_down(log, runs):
     assert [(run.name, run.group, len(run.episodes)) for run in runs] == [
-        ("alpha", "agents", 18), ("beta", "agents", 18), ("floor", "baselines", 18)
+        ("alpha", "agents", 18), ("beta", "agents", 18), ("base", "baselines", 18)
     ]  # fmt: skip
-    # Of the floor's own tasks, alpha has flown a part: it is no floor's business.
-    alone = with_baselines(log, load_runs(log, ["floor"]))
-    assert [run.name for run in alone] == ["floor"]
+    # Of the baseline's own tasks, alpha has flown a part: no baseline is added to it.
+    alone = with_baselines(log, load_runs(log, ["base"]))
+    assert [run.name for run in alone] == ["base"]
     other = log.parent / "other"
     write(other, "alpha", "package:Alpha", LOG["alpha"], more="M")
-    write(other, "floor", "stop", LOG["stop"])
+    write(other, "base", "stop", LOG["stop"])
     assert [run.name for run in with_baselines(other, load_runs(other, ["alpha"]))] == ["alpha"]
     groups = {"open": ["alpha"], "closed": ["package:Beta"]}
     assert [run.group for run in group_runs(runs, groups)] == ["open", "closed", "baselines"]
-    with pytest.raises(UsageError, match="group 'open': no run 'gamma': there are alpha, beta, floor"):
+    with pytest.raises(UsageError, match="group 'open': no run 'gamma': there are alpha, beta, base"):
         group_runs(runs, {"open": ["gamma"]})
 
 
@@ -250,7 +250,7 @@ def test_a_paired_comparison_is_of_common_tasks_and_exact(log, runs):
     # In the other order the same with the sign turned round.
     back = cells(paired.paired_tables(runs[1::-1], [AT_3])[0], "SR ↑")
     assert (back[2], back[4]) == ("+9.38", "0.750")
-    whole = load_runs(log, ["floor", "alpha"])
+    whole = load_runs(log, ["base", "alpha"])
     assert paired.paired_tables(whole, [AT_3])[0].notes[0].startswith("18 tasks")
     with pytest.raises(UsageError, match="two runs, not 3"):
         paired.paired_tables(runs, [AT_3])

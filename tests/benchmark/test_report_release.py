@@ -15,8 +15,8 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 import pytest
 from support.browser import errors
+from support.command_line import called
 from support.extended import set_difficulty
-from typer.testing import CliRunner
 
 from aerialdojo_gen.base.errors import AerialDojoError
 from aerialdojo_gen.benchmark.episodes import read_run
@@ -29,7 +29,6 @@ from aerialdojo_gen.benchmark.runner import Evaluation, evaluate
 from aerialdojo_gen.benchmark.runs import load_runs
 from aerialdojo_gen.benchmark.tables import ReportRequest, as_csv
 from aerialdojo_gen.benchmark.tasks import Selection
-from aerialdojo_gen.cli import app as cli
 from aerialdojo_gen.dataset.protocol import read_sample
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import open_root
@@ -109,16 +108,12 @@ def test_a_release_without_the_columns_leaves_them_out_and_says_why(planted):
         "(a release of this version has)"
     )
     assert missing_note(wanted, ["overall"]) == ""
-    command = ["report", "--data", str(planted.data), "--table"]
-    done = CliRunner().invoke(cli.app, [*command, "difficulty", "--table", "seen"])
-    assert done.exit_code == 0
+    command = ["report", "--data", planted.data, "--table"]
+    done = called(*command, "difficulty", "--table", "seen")
+    assert done.returncode == 0
     assert done.stderr.strip() == missing_note(wanted, ["all"])
     assert "κ" in done.stdout
-    assert CliRunner().invoke(cli.app, [*command, "overall"]).stderr == ""
-
-
-def told(*args):
-    return CliRunner().invoke(cli.app, [str(arg) for arg in args])
+    assert called(*command, "overall").stderr == ""
 
 
 @pytest.fixture(scope="module")
@@ -126,12 +121,12 @@ def flown(smoke, tmp_path_factory):
     """The sample flown by one agent, more by another, and none of it by a third."""
     out = tmp_path_factory.mktemp("protocol")
     common = ("--data", smoke, "--out", out, "--workers", 1)
-    done = told("evaluate", "--agent", "constant", "--protocol", "paper", *common)
-    assert done.exit_code == 0, done.output
-    assert "--protocol paper: smaller than the paper's sample: 2 of 8 maps, none of Natural, Infra" in done.output
-    assert f"report constant --log {out} --protocol paper" in done.output
+    done = called("evaluate", "--agent", "constant", "--protocol", "paper", *common)
+    assert done.returncode == 0, done.stderr
+    assert "--protocol paper: smaller than the paper's sample: 2 of 8 maps, none of Natural, Infra" in done.stderr
+    assert f"report constant --log {out} --protocol paper" in done.stderr
     for agent, more in (("stop", ("--split", "test")), ("random", ("--split", "train", "--limit", 2))):
-        assert told("evaluate", "--agent", agent, *more, *common).exit_code == 0
+        assert called("evaluate", "--agent", agent, *more, *common).returncode == 0
     return out
 
 
@@ -139,8 +134,8 @@ def test_the_sample_is_flown_and_reported_alone(smoke, flown):
     ids = read_sample(smoke).ids()
     assert set(read_run(flown, "constant")["task_id"].to_pylist()) == ids
     assert read_run(flown, "stop").num_rows > len(ids)
-    shown = told("report", "--protocol", "paper", "--data", smoke, "--log", flown, "--json")
-    assert shown.exit_code == 0, shown.output
+    shown = called("report", "--protocol", "paper", "--data", smoke, "--log", flown, "--json")
+    assert shown.returncode == 0, shown.stderr
     rows = [row for row in json.loads(shown.stdout) if (row["profile"], row["modality"]) == ("aerialdojo", "all")]
     # The run that flew none of it is left out.
     assert {row["run"] for row in rows} == {"constant", "stop"}
@@ -152,24 +147,23 @@ def test_the_sample_is_flown_and_reported_alone(smoke, flown):
 
 
 def test_the_tables_say_what_was_flown_of_the_sample(smoke, flown):
-    shown = told("report", "constant", "--protocol", "paper", "--data", smoke, "--log", flown)
-    words = " ".join(shown.output.split())
+    shown = called("report", "constant", "--protocol", "paper", "--data", smoke, "--log", flown)
+    words = " ".join(shown.stdout.split())
     assert "protocol alone, on U_Courtyard_0, U_Courtyard_1; ± is the sample standard deviation over these" in words
-    assert "of the sample's" not in shown.output
-    refused = told("report", "random", "--protocol", "paper", "--data", smoke, "--log", flown)
-    assert refused.exit_code == 1
-    said = "run 'random' has no finished episode of the paper's sample: run aerialdojo-gen eval"
-    assert said in str(refused.exception)
+    assert "of the sample's" not in shown.stdout
+    refused = called("report", "random", "--protocol", "paper", "--data", smoke, "--log", flown)
+    assert refused.returncode == 1
+    assert "run 'random' has no finished episode of the paper's sample: run aerialdojo-gen eval" in refused.stderr
 
 
 def test_a_release_without_its_file_and_a_run_of_part_of_it(smoke, flown, tmp_path):
     shutil.copytree(smoke / "release", tmp_path / "release")
     (tmp_path / "release" / "protocol.json").unlink()
     part = ("--setting", "base", "--limit", 6, "--data", smoke, "--out", tmp_path, "--workers", 1)
-    assert told("evaluate", "--agent", "stop", "--protocol", "paper", *part).exit_code == 0
-    shown = told("report", "--protocol", "paper", "--data", tmp_path)
-    assert shown.exit_code == 0, shown.output
-    assert "stop: 6 of the sample's 100 tasks." in " ".join(shown.output.split())
+    assert called("evaluate", "--agent", "stop", "--protocol", "paper", *part).returncode == 0
+    shown = called("report", "--protocol", "paper", "--data", tmp_path)
+    assert shown.returncode == 0, shown.stderr
+    assert "stop: 6 of the sample's 100 tasks." in " ".join(shown.stdout.split())
 
 
 @pytest.fixture(scope="module")

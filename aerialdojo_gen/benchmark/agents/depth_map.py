@@ -35,7 +35,7 @@ class DepthMap:
         """Forget everything: another height has another map."""
         n = 2 * _MIDDLE + 1
         self._cells = np.zeros((n, n), np.uint8)
-        # Told by experience, not by depth: stays when the map is drawn over.
+        # Known by experience, not by depth: stays when the map is drawn over.
         self._barred = np.zeros((n, n), np.uint8)
 
     def cell(self, x_m: float, y_m: float) -> tuple[int, int]:
