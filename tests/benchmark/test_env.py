@@ -179,14 +179,10 @@ def test_a_chosen_task_and_what_ends_it(smoke):
         observation, _, terminated, truncated, info = env.step(schemas.TURN_LEFT)
         assert truncated == (k == row["action_budget"] - 1)
         assert not terminated
-    final = {
-        "task_id": row["task_id"],
-        "success": False,
-        "distance_m": math.dist(env.episode.position, env.task.goal),
-    }
-    assert info == {"reason": "budget"} | final
+    last = {"task_id": row["task_id"], "success": False, "distance_m": math.dist(env.episode.position, env.task.goal)}
+    assert info == {"reason": "budget"} | last
     env.reset(options={"task_id": row["task_id"]})
-    ended = (0.0, True, False, {"reason": "stop"} | final)
+    ended = (0.0, True, False, {"reason": "stop"} | last)
     assert env.step(0)[1:] == ended, "the start is never within 3 m of the goal"
     with pytest.raises(RuntimeError, match="stop"):
         env.step(0)
