@@ -128,7 +128,7 @@ def _measure_steps(
                 break
         if asks:
             used = agent.usage()
-            requests += used.requests
+            requests += used.requests or 0
             tokens_in += used.input_tokens or 0
             tokens_out += used.output_tokens or 0
             request_s += used.request_s or 0.0

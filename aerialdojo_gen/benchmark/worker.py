@@ -77,11 +77,11 @@ class GuardedAgent:
         # Files cannot hold lone surrogates.
         return self._secrets.text(text.encode("utf-8", "replace").decode("utf-8")) if isinstance(text, str) else None
 
-    def usage(self) -> Usage | None:
-        """Return what was used since the last `reset`."""
+    def usage(self) -> Usage:
+        """Return what was used since the last `reset`; nothing is known of an agent that does not say it."""
         used = self._call("usage", self._used) if self._used is not None else None
         if used is None or isinstance(used, Usage):
-            return used
+            return used or _UNKNOWN
         raise self._wrong(f"returned {_short(used)} from usage, where Usage or None is expected")
 
     def _call(self, what: str, method: Callable[..., Any], *args: Any) -> Any:
@@ -106,20 +106,15 @@ def _short(value: Any) -> str:
     return f"{text[:60]} ({type(value).__name__})"
 
 
-def _add_usage(a: Usage | None, b: Usage | None) -> Usage | None:
+_UNKNOWN = Usage(requests=None)
+
+
+def _add_usage(a: Usage, b: Usage) -> Usage:
     """Add the usage of two attempts; unknown counts stay unknown."""
-    if a is None or b is None:
-        return a or b
     known = {f.name: [v for v in (getattr(a, f.name), getattr(b, f.name)) if v is not None] for f in fields(Usage)}
     longest_s = max(known.pop("longest_request_s"), default=None)
     sums: dict[str, Any] = {name: sum(values) if values else None for name, values in known.items()}
     return Usage(**sums, longest_request_s=longest_s)
-
-
-def _usage_columns(used: Usage | None) -> dict[str, Any]:
-    """Usage columns of `episodes` and `failures`."""
-    columns = {name: getattr(used, name, None) for name in ("input_tokens", "output_tokens", "cost_usd")}
-    return {"n_requests": getattr(used, "requests", None)} | columns
 
 
 _LONGEST_PAUSE_S = 600.0
@@ -209,7 +204,7 @@ class Worker:
 
     def _finish(self, task: Task, stopped: Callable[[], bool]) -> tuple[dict[str, Any], Finished] | None:
         """Fly one episode, with retries after external failures; None if the run is stopped meanwhile."""
-        used: Usage | None = None
+        used = _UNKNOWN
         record, failed, attempt, again = None, Failed("", ""), 0, True
         while record is None and again and attempt < self._retry_policy.attempts:
             attempt += 1
@@ -227,14 +222,16 @@ class Worker:
                 failed, again = Failed("agent error", self._line(error)), False
         if record is not None:
             used = _add_usage(used, self._guarded.usage())
-        tokens = (used.input_tokens or 0) + (used.output_tokens or 0) if used else 0
-        spent = Finished(1, cost_usd=used.cost_usd or 0.0 if used else 0.0, tokens=tokens)
+        columns = {name: getattr(used, name) for name in ("input_tokens", "output_tokens", "cost_usd")}
+        columns["n_requests"] = used.requests
+        tokens = (used.input_tokens or 0) + (used.output_tokens or 0)
+        spent = Finished(1, cost_usd=used.cost_usd or 0.0, tokens=tokens)
         if record is None:
-            row = self._key(task) | {"attempts": attempt} | failed._asdict() | _usage_columns(used)
+            row = self._key(task) | {"attempts": attempt} | failed._asdict() | columns
             return {"task_id": task.row["task_id"], "failure": row}, replace(spent, streak=(failed,))
-        record["episode"] |= _usage_columns(used)
-        times = (used.request_s, used.longest_request_s) if used else (None, None)
-        record["timing"] |= {"attempts": attempt, "request_s": times[0], "longest_request_s": times[1]}
+        record["episode"] |= columns
+        times = {"request_s": used.request_s, "longest_request_s": used.longest_request_s}
+        record["timing"] |= {"attempts": attempt} | times
         return record, replace(spent, actions=record["episode"]["n_actions"], flown=1)
 
     def _pause(self, attempt: int, requested_s: float | None, stopped: Callable[[], bool]) -> bool:

@@ -22,7 +22,7 @@ class InvalidAnswer(AerialDojoError):  # noqa: N818
 class Usage:
     """What an agent has used since its last `reset`; None where it is not known."""
 
-    requests: int = 0  # Calls of an outside service, repeated ones too
+    requests: int | None = 0  # Calls of an outside service, repeated ones too
     input_tokens: int | None = None
     output_tokens: int | None = None
     cost_usd: float | None = None
