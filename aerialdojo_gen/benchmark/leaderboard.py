@@ -92,11 +92,8 @@ def _lines(cards: Sequence[ScoreCard], setting: str) -> list[Row]:
             lines.append(Row(label, card.agent, whole, cells))
     for result in results():
         if result.setting == setting:
-            cells = {
-                (metric, radius_m, "all"): Cell(value, text(metric, value), f"± {text(metric, result.spread[key])}")
-                for key, value in result.mean.items()
-                for metric, radius_m in (key,)
-            }
+            spread = {key: f"± {text(key[0], value)}" for key, value in result.spread.items()}
+            cells = {(*key, "all"): Cell(v, text(key[0], v), spread[key]) for key, v in result.mean.items()}
             lines.append(Row(result.model, "paper", None, cells, is_paper=True))
     return sorted(lines, key=lambda line: -(line.cells.get(("sr", _NEAR_M, "all"), Cell()).value or 0.0))
 
