@@ -31,7 +31,7 @@ from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.atomic import make_folder
 from aerialdojo_gen.store.cache import cache_folder
-from aerialdojo_gen.store.layout import check_run_name, shard_folder
+from aerialdojo_gen.store.layout import shard_folder
 from aerialdojo_gen.store.root import DataRoot, LocalRoot, Where, open_root
 from aerialdojo_gen.store.tables import from_rows
 
@@ -158,7 +158,7 @@ class Journals:
     """The journals of a run."""
 
     def __init__(self, root: DataRoot, run: str) -> None:
-        self._root, self._name = root, f"runs/{check_run_name(run)}/journal"
+        self._root, self._name = root, f"runs/{run}/journal"
         self._committed = not isinstance(root, LocalRoot)
         if isinstance(root, LocalRoot):
             self.folder = root.path / self._name

@@ -54,12 +54,10 @@ def evaluate(
     limits = limits or Limits()
     root, log = open_root(data), open_root(data if out is None else out)
     reporter = reporter or Reporter(quiet=True)
-    folder = log.below(f"runs/{check_run_name(evaluation.run)}")
-    rows = select(root, evaluation.selection)
-    run = RunLog(root, log, folder, evaluation, rows)
+    run = RunLog(root, log, evaluation)
     paths = SharedPaths(on_disk(root, below="release"), (), (run.journals.folder,), reporter.line)
     made = make_executor(executor, workers, address, paths)
-    with folder.lock(), Interrupts() as interrupts:
+    with run.folder.lock(), Interrupts() as interrupts:
         if restart:
             run.drop()
         run.check_settings()
@@ -68,7 +66,7 @@ def evaluate(
         if todo.num_rows:
             evaluation = preflight(evaluation, limits, reporter)
             if run.no_viewpoints_message and run.goals_known:
-                reporter.line(no_viewpoints_message(run.no_viewpoints_message, len(rows["scene"].unique())))
+                reporter.line(no_viewpoints_message(run.no_viewpoints_message, len(run.rows["scene"].unique())))
         total = run.spent()
         with reporter.bar(evaluation.label, todo.num_rows, "episodes") as bar:
 
@@ -99,7 +97,7 @@ def evaluate(
     if kind := limits.failing(total):
         why = f"stopped after {limits.failures_in_row} failures in a row of one kind ({kind})."
     return Outcome(
-        rows.num_rows, finished, failed, total.episodes, total.actions, total.cost_usd, total.tokens,
+        run.rows.num_rows, finished, failed, total.episodes, total.actions, total.cost_usd, total.tokens,
         time.monotonic() - started, why, run.failures(), total.flown, successes if run.goals_known else None,
     )  # fmt: skip
 
@@ -107,15 +105,14 @@ def evaluate(
 class RunLog:
     """A run's folder and tables: what is in them, and what is left to fly."""
 
-    def __init__(
-        self, data: DataRoot, out: DataRoot, folder: DataRoot, evaluation: Evaluation, rows: pa.Table
-    ) -> None:
-        self._out, self._folder, self._name = out, folder, evaluation.run
+    def __init__(self, data: DataRoot, out: DataRoot, evaluation: Evaluation) -> None:
+        self._out, self._name = out, evaluation.run
+        self.folder = out.below(f"runs/{check_run_name(evaluation.run)}")
+        self.rows = select(data, evaluation.selection)
         self.journals = Journals(out, evaluation.run)
         self._uncommitted = ""
-        self._rows = rows
-        self._scenes: list[str] = rows["scene"].unique().to_pylist()
-        subsets = rows["subset"].unique().to_pylist()
+        self._scenes: list[str] = self.rows["scene"].unique().to_pylist()
+        subsets = self.rows["subset"].unique().to_pylist()
         content = {
             f"{table}/{scene}": store.content(data, table, scene)
             for scene in self._scenes
@@ -136,10 +133,10 @@ class RunLog:
         begun = episodes.run_scenes(self._out, self._name) or self.journals
         advice = "give another --run, or --restart"
         # A run without finished episodes may change: an agent's options may have been wrong.
-        if begun and self._folder.exists(_SETTINGS):
-            before, own = read_json(self._folder.local_copy(_SETTINGS), UsageError), ("data", "code")
+        if begun and self.folder.exists(_SETTINGS):
+            before, own = read_json(self.folder.local_copy(_SETTINGS), UsageError), ("data", "code")
             if not isinstance(before, dict):
-                raise UsageError(f"{self._folder.at(_SETTINGS)} holds no settings of a run: {advice}")
+                raise UsageError(f"{self.folder.at(_SETTINGS)} holds no settings of a run: {advice}")
             for key, value in self._settings.items():
                 if before.get(key) != value:
                     what = f"{key} = {before.get(key)!r}, not {value!r}"
@@ -149,14 +146,14 @@ class RunLog:
             written = store.shards(self._out, "episodes", scene, self._name)[0]
             if store.read_info(self._out, written).fingerprint != self._fingerprint:
                 raise UsageError(f"there are episodes of another run {self._name!r} in {self._out}: {advice}")
-        with self._folder.commit(_SETTINGS) as temporary:
+        with self.folder.commit(_SETTINGS) as temporary:
             temporary.write_text(json.dumps(self._settings, indent=2, sort_keys=True) + "\n", encoding="utf-8")
 
     def drop(self) -> None:
         """Remove the run."""
         episodes.remove_run(self._out, self._name)
         self.journals.drop()
-        self._folder.delete(_SETTINGS)
+        self.folder.delete(_SETTINGS)
 
     def flush_journals(self, scene: str = "*") -> None:
         """Move the journals of a scene, or of all, into the tables."""
@@ -176,11 +173,11 @@ class RunLog:
 
     def todo(self, rerun_failed: bool) -> pa.Table:
         """Rows still to be flown, or exactly those that failed."""
-        ids = self._rows["task_id"]
+        ids = self.rows["task_id"]
         if rerun_failed:
-            return self._rows.filter(pc.is_in(ids, pa.array(self._ids("failures"), pa.string())))
+            return self.rows.filter(pc.is_in(ids, pa.array(self._ids("failures"), pa.string())))
         done = self._ids("episodes") + self._ids("failures")
-        return self._rows.filter(pc.invert(pc.is_in(ids, pa.array(done, pa.string()))))
+        return self.rows.filter(pc.invert(pc.is_in(ids, pa.array(done, pa.string()))))
 
     def counts(self) -> tuple[int, int, int]:
         """Episodes in the tables: finished, failed, successful."""

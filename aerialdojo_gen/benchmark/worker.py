@@ -37,8 +37,8 @@ class GuardedAgent:
 
     def __init__(self, agent: Agent, name: str, secrets: Secrets, tolerate: bool = False) -> None:
         self._agent, self._name, self._secrets, self._tolerate = agent, name, secrets, tolerate
-        self._answer: Any = getattr(agent, "answer", None)
-        self._used: Any = getattr(agent, "usage", None)
+        self._answer: Any = getattr(agent, "answer", lambda: None)
+        self._used: Any = getattr(agent, "usage", lambda: None)
         self.task = ""
 
     def reset(self, task_id: str, goal: Goal) -> None:
@@ -71,15 +71,13 @@ class GuardedAgent:
 
     def answer(self) -> str | None:
         """Return the agent's text for the last action, without secrets."""
-        if self._answer is None:
-            return None
         text = self._call("answer", self._answer)
         # Files cannot hold lone surrogates.
         return self._secrets.text(text.encode("utf-8", "replace").decode("utf-8")) if isinstance(text, str) else None
 
     def usage(self) -> Usage:
         """Return what was used since the last `reset`; nothing is known of an agent that does not say it."""
-        used = self._call("usage", self._used) if self._used is not None else None
+        used = self._call("usage", self._used)
         if used is None or isinstance(used, Usage):
             return used or _UNKNOWN
         raise self._wrong(f"returned {_short(used)} from usage, where Usage or None is expected")
