@@ -20,7 +20,6 @@ from aerialdojo_gen.base.secrets import Secrets
 from aerialdojo_gen.benchmark.agents import AgentBase
 from aerialdojo_gen.benchmark.agents.goal import Goal, Observation, Sensors
 from aerialdojo_gen.benchmark.evaluation import Evaluation
-from aerialdojo_gen.benchmark.flight import Flight
 from aerialdojo_gen.benchmark.runner import RunLog
 from aerialdojo_gen.benchmark.worker import Finished, RetryPolicy, Worker
 from aerialdojo_gen.rendering.gl import release_context
@@ -54,8 +53,7 @@ class Session(AgentBase):
         self._evaluation = evaluation
         self._run = RunLog(self._data, log, evaluation)
         self.sensors = evaluation.sensors or Sensors()
-        self._flight = Flight(self._data, self.sensors, embodiment=evaluation.embodiment,
-                              renderer=evaluation.renderer, hints=evaluation.hints)  # fmt: skip
+        self._flight = evaluation.flight_of(self, self._data)
         self._goal: Goal | None = None
         self._observation: Observation | None = None
         self._next_scene = ""
