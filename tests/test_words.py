@@ -161,7 +161,7 @@ def test_pybullet_and_language_models_packages_are_loaded_by_who_asks_for_them()
         "from aerialdojo_gen.rendering import backend, casters, checks, gl, picture, raycast\n"
         "from aerialdojo_gen.pipeline.stages.work import anchor_sample, reference_images, render\n"
         "from aerialdojo_gen.benchmark import observations\n"
-        "from aerialdojo_gen.benchmark.llm import anthropic_agent, openai_agent\n"
+        "from aerialdojo_gen.benchmark.llm import protocols\n"
         "assert not {'pybullet', 'openai', 'anthropic'} & set(sys.modules)\n"
         "from aerialdojo_gen.rendering import world\n"
         "assert 'pybullet' in sys.modules\n"

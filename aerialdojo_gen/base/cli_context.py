@@ -54,7 +54,11 @@ def program(called_as: str) -> str:
     if Path(called_as).name != PROGRAM:
         return ""
     found = shutil.which(PROGRAM)
-    return PROGRAM if found and Path(found).resolve() == Path(called_as).resolve() else _relative_path(called_as)
+    if found and Path(found).resolve() == Path(called_as).resolve():
+        return PROGRAM
+    # As one would type it in the working directory.
+    relative = os.path.relpath(called_as)
+    return called_as if relative.startswith("..") or not Path(called_as).is_absolute() else relative
 
 
 @contextmanager
@@ -82,9 +86,3 @@ def command(verb: str, *words: object, **options: object) -> str:
         if value is not True:
             parts.append(str(value))
     return " ".join(shlex.quote(part) for part in parts)
-
-
-def _relative_path(path: str) -> str:
-    """Write a path as one would type it in the working directory."""
-    relative = os.path.relpath(path)
-    return path if relative.startswith("..") or not Path(path).is_absolute() else relative

@@ -104,7 +104,7 @@ def _read(file: Path) -> tuple[str, list[Path]]:
 def kernel_folder(source: Path) -> Path:
     """Make the folder for the machine code of a module: beside the source, or where this user can write."""
     name = folder_name(source)
-    beside = source.parent / "__pycache__" / "kernels" / name
+    in_package = source.parent / "__pycache__" / "kernels" / name
     tried = []
     for home in _homes(source):
         folder = home / "kernels" / name
@@ -112,7 +112,7 @@ def kernel_folder(source: Path) -> Path:
             if not folder.is_dir():
                 folder.parent.mkdir(parents=True, exist_ok=True)
                 _sweep(folder.parent, source.stem)
-                _copy(beside, folder)
+                _copy(in_package, folder)
                 folder.mkdir(exist_ok=True)
             tempfile.TemporaryFile(dir=folder).close()
             os.utime(folder)
@@ -144,11 +144,11 @@ def _homes(source: Path) -> Iterator[Path]:
             yield temporary / own
 
 
-def _copy(beside: Path, folder: Path) -> None:
+def _copy(in_package: Path, folder: Path) -> None:
     """Take over what is compiled already beside the source, where this user cannot write."""
-    if folder != beside and beside.is_dir():
+    if folder != in_package and in_package.is_dir():
         with contextlib.suppress(OSError), tempfile.TemporaryDirectory(dir=folder.parent) as scratch:
-            shutil.copytree(beside, Path(scratch, "copy"))
+            shutil.copytree(in_package, Path(scratch, "copy"))
             Path(scratch, "copy").rename(folder)
 
 

@@ -59,10 +59,10 @@ def splits() -> dict[tuple[str, str], dict[str, int]]:
 class PaperResult:
     """A row of the paper's Table 4 (Base) or 5 (Standard): flown in its simulator, Unreal Engine."""
 
-    setting: str  # ``base`` or ``standard``; ``open`` or ``closed`` (source); the model
-    group: str
+    setting: str  # ``base`` or ``standard``
+    group: str  # ``open`` or ``closed``, of the model's source
     model: str
-    mean: dict[tuple[str, float], float]  # dict of (str, float) to float
+    mean: dict[tuple[str, float], float]  # By metric and radius in metres
     spread: dict[tuple[str, float], float]
     source: str  # Table of the paper
 
@@ -84,10 +84,8 @@ def results() -> tuple[PaperResult, ...]:
         }
 
     return tuple(
-        PaperResult(
-            row["setting"], row["group"], row["model"], values(row, "mean"), values(row, "std"), row["source"]
-        )
-        for row in _rows("results.csv")
+        PaperResult(r["setting"], r["group"], r["model"], values(r, "mean"), values(r, "std"), r["source"])
+        for r in _rows("results.csv")
     )
 
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import base64
 import struct
-from dataclasses import dataclass
 from typing import Any
 
 import cv2
@@ -28,8 +27,6 @@ PLAIN_PNG: tuple[int, ...] = ()
 
 SCORED_JPEG, PROMPT_JPEG = 88, 90
 GALLERY_JPEG, PAGE_JPEG, MAP_JPEG, REPLAY_JPEG = 82, 95, 82, 75
-
-_JPEG_START = b"\xff\xd8"
 
 
 def encode_png(image: NDArray[np.uint8] | NDArray[np.uint16], setting: tuple[int, ...] = PLAIN_PNG) -> bytes:
@@ -88,33 +85,23 @@ def decode_masked(file: bytes | memoryview | None) -> tuple[NDArray[np.uint8] | 
     return np.ascontiguousarray(image[..., 2::-1]), np.asarray(image[..., 3] >= 128)
 
 
-def data_url(file: bytes) -> str:
-    """Write a PNG or JPEG as a data URL, for pages that are one file."""
-    return f"data:{media_type(file)};base64,{base64.b64encode(file).decode('ascii')}"
-
-
 def media_type(file: bytes) -> str:
     """Name the media type of a PNG or JPEG: ``image/png`` or ``image/jpeg``."""
-    return "image/jpeg" if file.startswith(_JPEG_START) else "image/png"
+    return "image/jpeg" if file.startswith(b"\xff\xd8") else "image/png"
 
 
-@dataclass(frozen=True)
 class Picture:
-    """An encoded picture."""
+    """An encoded picture, as text: for pages that are one file, and for a model's service."""
 
-    media_type: str  # ``image/jpeg`` or ``image/png``
-    base64: str  # The file
-
-    @property
-    def data_url(self) -> str:
-        """The picture as a data URL."""
-        return f"data:{self.media_type};base64,{self.base64}"
+    def __init__(self, file: bytes) -> None:
+        self.media_type = media_type(file)
+        self.base64 = base64.b64encode(file).decode("ascii")
+        self.data_url = f"data:{self.media_type};base64,{self.base64}"
 
 
 def colour_picture(rgb: NDArray[np.uint8], size_px: int) -> Picture:
     """Encode (H, W, 3) uint8 sRGB as JPEG, scaled down to a longest side of `size_px`."""
-    scaled = _at_most(rgb, size_px, cv2.INTER_AREA)
-    return _picture(encode_jpeg(scaled, PROMPT_JPEG))
+    return Picture(encode_jpeg(_at_most(rgb, size_px, cv2.INTER_AREA), PROMPT_JPEG))
 
 
 def depth_picture(depth_m: NDArray[np.float32], max_depth_m: float, size_px: int) -> Picture:
@@ -122,7 +109,7 @@ def depth_picture(depth_m: NDArray[np.float32], max_depth_m: float, size_px: int
     scaled = _at_most(depth_m, size_px, cv2.INTER_NEAREST)
     seen = np.isfinite(scaled) & (scaled > 0.0)
     grey = np.where(seen, np.clip(np.where(seen, scaled, 0.0) / max_depth_m, 0.0, 1.0), 1.0)
-    return _picture(encode_png(np.rint(grey * 255.0).astype(np.uint8)))
+    return Picture(encode_png(np.rint(grey * 255.0).astype(np.uint8)))
 
 
 def _at_most(image: NDArray[Any], size_px: int, interpolation: int) -> NDArray[Any]:
@@ -132,10 +119,6 @@ def _at_most(image: NDArray[Any], size_px: int, interpolation: int) -> NDArray[A
         return image
     shape = (max(1, round(width * scale)), max(1, round(height * scale)))
     return np.asarray(cv2.resize(image, shape, interpolation=interpolation))
-
-
-def _picture(file: bytes) -> Picture:
-    return Picture(media_type(file), base64.b64encode(file).decode("ascii"))
 
 
 def image_size(file: bytes | memoryview) -> tuple[int, int] | None:

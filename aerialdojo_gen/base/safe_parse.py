@@ -158,22 +158,20 @@ def find_violation(
     stack: list[tuple[Any, Any, int]] = [(value, None, 0)]
     while stack:
         item, path, depth = stack.pop()
-        kind = type(item)
+        kind, why = type(item), ""
         if kind is str:
             why = _wrong_text(item, longest)
-        elif kind is int and integers:
-            why = "" if -MAX_INTEGER - 1 <= item <= MAX_INTEGER else "is an integer beyond 64 bits"
-        elif kind is float and finite:
-            why = "" if math.isfinite(item) else f"is {item}, no finite number"
-        elif kind is dict or kind is list:
-            why = f"is nested more than {MAX_DEPTH} deep" if depth >= MAX_DEPTH else ""
-            if not why:
-                pairs = item.items() if kind is dict else enumerate(item)
-                stack += [(inner, (path, key), depth + 1) for key, inner in pairs]
-            if not why and kind is dict:
-                why = next((f"has a key that {wrong}" for key in item if (wrong := _wrong_text(key, longest))), "")
-        else:
-            why = ""
+        elif kind is int and integers and not -MAX_INTEGER - 1 <= item <= MAX_INTEGER:
+            why = "is an integer beyond 64 bits"
+        elif kind is float and finite and not math.isfinite(item):
+            why = f"is {item}, no finite number"
+        elif kind in (dict, list) and depth >= MAX_DEPTH:
+            why = f"is nested more than {MAX_DEPTH} deep"
+        elif kind in (dict, list):
+            pairs = item.items() if kind is dict else enumerate(item)
+            stack += [(inner, (path, key), depth + 1) for key, inner in pairs]
+            wrong = filter(None, (_wrong_text(key, longest) for key in item)) if kind is dict else iter(())
+            why = next((f"has a key that {fault}" for fault in wrong), "")
         if why:
             keys = []
             while path is not None:
@@ -245,11 +243,9 @@ def _no_number(name: str) -> Any:
     raise Malformed(f"is not JSON: {name} is no finite number")
 
 
-def _wrong_text(text: Any, longest: int) -> str:
-    if type(text) is str and len(text) > longest:
+def _wrong_text(text: str, longest: int) -> str:
+    if len(text) > longest:
         return f"has {len(text):,} characters, the most is {longest:,}"
-    if type(text) is not str or text.isascii():
-        return "has a NUL character" if type(text) is str and "\0" in text else ""
     try:
         text.encode()
     except UnicodeEncodeError:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 REDACTED = "[redacted]"
@@ -37,7 +37,8 @@ class Secrets:
 
     def __init__(self, options: Mapping[str, Any] | None = None, values: Iterable[str] = ()) -> None:
         found = {value for name, value in os.environ.items() if is_secret_name(name) and name not in _FOLDERS}
-        found |= set(_under_secret_names(options or {})) | set(values)
+        found |= set(values)
+        _map_texts(options or {}, lambda text, hidden: found.add(text) if hidden else None)
         # The longest first: one may be the beginning of another.
         self._known = sorted({v for v in found if len(v.strip()) >= _MIN_CHARACTERS}, key=len, reverse=True)
 
@@ -49,23 +50,16 @@ class Secrets:
             text = pattern.sub(instead, text)
         return text
 
-    def options(self, value: Any, hidden: bool = False) -> Any:
+    def options(self, value: Any) -> Any:
         """Return options, or a part of them, without secrets: by their names, and by what they look like."""
-        if isinstance(value, Mapping):
-            return {self.text(str(k)): self.options(v, hidden or is_secret_name(str(k))) for k, v in value.items()}
-        if isinstance(value, (list, tuple)):
-            return [self.options(item, hidden) for item in value]
-        if isinstance(value, str):
-            return REDACTED if hidden and value else self.text(value)
-        return value
+        return _map_texts(value, lambda text, hidden: REDACTED if hidden and text else self.text(text))
 
 
-def _under_secret_names(value: Any, hidden: bool = False) -> Iterator[str]:
+def _map_texts(value: Any, change: Callable[[str, bool], Any], hidden: bool = False) -> Any:
+    """Change all texts in options, keys too; what changes them hears whether they are under a secret's name."""
     if isinstance(value, Mapping):
-        for key, inner in value.items():
-            yield from _under_secret_names(inner, hidden or is_secret_name(str(key)))
-    elif isinstance(value, (list, tuple)):
-        for inner in value:
-            yield from _under_secret_names(inner, hidden)
-    elif isinstance(value, str) and hidden:
-        yield value
+        names = {str(key): inner for key, inner in value.items()}
+        return {change(k, False): _map_texts(v, change, hidden or is_secret_name(k)) for k, v in names.items()}
+    if isinstance(value, (list, tuple)):
+        return [_map_texts(item, change, hidden) for item in value]
+    return change(value, hidden) if isinstance(value, str) else value

@@ -26,9 +26,8 @@ def as_text(table: TextTable, width: int | None = None) -> str:
 
 def legend(tables: Sequence[TextTable]) -> str:
     """Explain the marks in terminal tables; empty if there are none."""
-    if not any(table.marks for table in tables):
-        return ""
-    return "¹ best, ² second of those compared; the oracle, which is given the route, is not."
+    marked = any(table.marks for table in tables)
+    return "¹ best, ² second of those compared; the oracle, which is given the route, is not." if marked else ""
 
 
 def as_markdown(table: TextTable) -> str:

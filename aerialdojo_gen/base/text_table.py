@@ -118,13 +118,7 @@ class _Body:
 
     def _spans(self, block: list[int]) -> list[list[int]]:
         """Divide a block's columns by the group that they belong to."""
-        columns, spans = self.table.columns, [[k] for k in block[:1]]
-        for before, k in itertools.pairwise(block):
-            if columns[k].group == columns[before].group:
-                spans[-1].append(k)
-            else:
-                spans.append([k])
-        return spans
+        return [list(span) for _, span in itertools.groupby(block, lambda k: self.table.columns[k].group)]
 
     def _breadth(self, block: list[int], widths: Sequence[int]) -> int:
         return self.stub + sum(

@@ -26,12 +26,8 @@ _Columns = dict[str, dict[str, Any]]
 def _bins(*edges: float) -> _Parts:
     """Bins of numbers; a rounding error below the lowest edge belongs to the first bin."""
     heads = [f"{low:g} to {high:g}" for low, high in pairwise(edges)] + [f"{edges[-1]:g} and more"]
-    bounds = zip((-math.inf, *edges[1:]), (*edges[1:], math.inf), strict=True)
-    return {head: _within(*ends) for head, ends in zip(heads, bounds, strict=True)}
-
-
-def _within(low: float, high: float) -> Callable[[Any], bool]:
-    return lambda value: low <= value < high
+    bounds = pairwise((-math.inf, *edges[1:], math.inf))
+    return {h: lambda value, ends=ends: ends[0] <= value < ends[1] for h, ends in zip(heads, bounds, strict=True)}
 
 
 @dataclass(frozen=True)
@@ -95,8 +91,8 @@ _SPECS = (
 class Breakdowns:
     """All breakdowns of the episodes of some runs."""
 
-    found: tuple[Breakdown, ...] = ()
-    missing: tuple[str, ...] = ()  # Columns that neither the logs nor the release have
+    found: Mapping[str, Breakdown]  # By name
+    missing: Sequence[str]  # Columns that neither the logs nor the release have
 
     @property
     def missing_note(self) -> str:
@@ -113,15 +109,15 @@ class Breakdowns:
 def find_breakdowns(root: DataRoot, runs: Sequence[Run]) -> Breakdowns:
     """Break the episodes of runs down by columns of the log, or of the release."""
     released = cache(partial(_released, root))
-    found, missing = [], []
+    found, missing = {}, []
     for b in _SPECS:
         values = [_values(run, b, released) for run in runs]
         if any(v is None for v in values):
             missing.append(b.name)
             continue
         labels = tuple(np.array([_label(value, b.conditions) for value in v or []], dtype=np.str_) for v in values)
-        found.append(replace(b, labels=labels))
-    return Breakdowns(tuple(found), tuple(missing))
+        found[b.name] = replace(b, labels=labels)
+    return Breakdowns(found, missing)
 
 
 def _label(value: Any, parts: _Parts) -> str:
@@ -133,7 +129,7 @@ def _label(value: Any, parts: _Parts) -> str:
 def _values(run: Run, breakdown: Breakdown, released: Callable[[str, str, str], _Columns]) -> list[Any] | None:
     """Return a column's values for a run's episodes, from its log or the release; None if neither has it."""
     if breakdown.columns == ("detour_ratio",):
-        straight, flown = run.episodes.euclidean_m, run.episodes.reference_length_m
+        straight, flown = run.episodes["euclidean_m"], run.episodes["reference_length_m"]
         return list(np.divide(flown, straight, out=np.full_like(flown, np.inf), where=straight > 0.0).tolist())
     columns = []
     for name in breakdown.columns:
@@ -152,22 +148,9 @@ def _values(run: Run, breakdown: Breakdown, released: Callable[[str, str, str], 
 
 def _released(root: DataRoot, table: str, scene: str, subset: str) -> _Columns:
     """Read a release's columns, by navigation task; none where there is no release."""
-    wanted = [name for b in _SPECS if b.table == table for name in b.columns if name != "detour_ratio"]
-    found = _stored(root, table, scene, subset, wanted)
-    if table == "tasks" and "target_seen_in_train" not in found:
-        # An older release lacks the column: derived from the targets of its routes.
-        targets, own = (
-            _stored(root, "routes", scene, side, ["target_object_id"]).get("target_object_id", {})
-            for side in ("train", subset)
-        )
-        known = set(targets.values())
-        found["target_seen_in_train"] = {nav_id: target in known for nav_id, target in own.items()}
-    return found
-
-
-def _stored(root: DataRoot, table: str, scene: str, subset: str, names: Sequence[str]) -> _Columns:
     if not store.shards(root, f"{table}/{subset}", scene):
         return {}
+    names = [name for b in _SPECS if b.table == table for name in b.columns if name != "detour_ratio"]
     read = store.read_stored(root, f"{table}/{subset}", scene, ["nav_id", *names]).to_pydict()
     ids = read.pop("nav_id")
     return {name: dict(zip(ids, values, strict=True)) for name, values in read.items()}

@@ -12,7 +12,6 @@ import pyarrow.compute as pc
 from aerialdojo_gen.base.errors import AerialDojoError, UsageError
 from aerialdojo_gen.benchmark.agents import InvalidAnswer, agent_class, load_agent
 from aerialdojo_gen.benchmark.evaluation import Evaluation
-from aerialdojo_gen.benchmark.flight import Flight
 from aerialdojo_gen.benchmark.llm.agent import LanguageModelAgent
 from aerialdojo_gen.benchmark.tasks import read_tasks, select
 from aerialdojo_gen.store import shards as store
@@ -78,13 +77,14 @@ def estimate(data: Where, evaluation: Evaluation) -> Estimate:
             except AerialDojoError as error:
                 why_not = str(error).removeprefix("checked before the run, nothing flown: ")
         figures = _measure_steps(root, evaluation, rows, agent, asks=not why_not)
-        requests = _reference_actions(root, rows), int(pc.sum(rows["action_budget"]).as_py())
-        tokens_in, tokens_out, request_s, render_s, n = figures
-        costs = [agent.options.cost_usd(k * tokens_in, k * tokens_out) for k in requests]
-        cost = None if costs[0] is None or costs[1] is None else (costs[0], costs[1])
     finally:
         agent.close()
-    return Estimate(rows.num_rows, requests, tokens_in, tokens_out, request_s, render_s, n, why_not, cost)
+    tokens_in, tokens_out, *_ = figures
+    requests = _reference_actions(root, rows), int(pc.sum(rows["action_budget"]).as_py())
+    least, most = (agent.options.cost_usd(k * tokens_in, k * tokens_out) for k in requests)
+    return Estimate(
+        rows.num_rows, requests, *figures, why_not, None if least is None or most is None else (least, most)
+    )
 
 
 def _make_agent(evaluation: Evaluation) -> tuple[LanguageModelAgent, str]:
@@ -103,12 +103,10 @@ def _measure_steps(
     root: DataRoot, evaluation: Evaluation, rows: pa.Table, agent: LanguageModelAgent, asks: bool
 ) -> tuple[float, float, float, float, int]:
     """Fly the first steps of a few tasks; tokens in and out, seconds of a request and of its pictures, how many."""
-    sensors = evaluation.sensors or agent.sensors
-    body, renderer, hints = evaluation.embodiment, evaluation.renderer, evaluation.hints
-    flight = Flight(root, sensors, embodiment=body, renderer=renderer, hints=hints)
+    flight = evaluation.flight_of(agent, root)
     # Of one scene: opening another takes longer than all the requests.
     few = rows.filter(pc.equal(rows["scene"], rows["scene"][0].as_py())).slice(0, _TASKS)
-    sums = [0.0, 0.0, 0.0, 0.0]
+    tokens_in = tokens_out = request_s = render_s = 0.0
     requests = renders = 0
     for task in read_tasks(root, few):
         episode = flight.begin(task)
@@ -117,29 +115,27 @@ def _measure_steps(
             began = time.perf_counter()
             observation = flight.observe()
             # The first image of a scene includes the time to open it.
-            if renders:
-                sums[3] += time.perf_counter() - began
+            render_s += time.perf_counter() - began if renders else 0.0
             renders += 1
             if not asks:
-                sums[0] += agent.estimate_tokens(observation)
+                tokens_in += agent.estimate_tokens(observation)
                 continue
             try:
-                action: int | None = agent.act(observation)
+                episode.step(agent.act(observation))
             except InvalidAnswer:
-                action = None
-            episode.step(action)
+                episode.step(None)
             if episode.termination is not None:
                 break
         if asks:
             used = agent.usage()
-            requests += used.requests
-            sums[0] += used.input_tokens or 0
-            sums[1] += used.output_tokens or 0
-            sums[2] += used.request_s or 0.0
-    render_s = sums[3] / max(1, renders - 1)
+            requests += used.requests or 0
+            tokens_in += used.input_tokens or 0
+            tokens_out += used.output_tokens or 0
+            request_s += used.request_s or 0.0
+    render_s /= max(1, renders - 1)
     if not asks:
-        return sums[0] / renders, _ASSUMED_OUT, _ASSUMED_S, render_s, 0
-    return sums[0] / requests, sums[1] / requests, sums[2] / requests, render_s, requests
+        return tokens_in / renders, _ASSUMED_OUT, _ASSUMED_S, render_s, 0
+    return tokens_in / requests, tokens_out / requests, request_s / requests, render_s, requests
 
 
 def _reference_actions(root: DataRoot, rows: pa.Table) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import importlib.util
 import json
@@ -14,10 +15,12 @@ from aerialdojo_gen.base.config.shared import Embodiment
 from aerialdojo_gen.base.secrets import Secrets
 from aerialdojo_gen.benchmark.agents.goal import Sensors
 from aerialdojo_gen.benchmark.agents.load import BUILT_IN, add_working_directory
+from aerialdojo_gen.benchmark.flight import Flight
 from aerialdojo_gen.benchmark.tasks import Selection, check_hints
-from aerialdojo_gen.benchmark.worker import Failed, Finished, RetryPolicy
+from aerialdojo_gen.benchmark.worker import Finished, RetryPolicy
 from aerialdojo_gen.pipeline.code_digest import code_of
 from aerialdojo_gen.store.files import file_digest
+from aerialdojo_gen.store.root import DataRoot
 
 
 @dataclass(frozen=True)
@@ -51,6 +54,12 @@ class Evaluation:
         options = json.dumps(self._logged(self.options if self.used is None else self.used), sort_keys=True)
         hints = ",".join(check_hints(self.hints))
         return {"run_id": self.run, "agent": self.agent, "agent_options": options, "told": hints}
+
+    def flight_of(self, agent: Any, data: DataRoot) -> Flight:
+        """Make the flight of an agent, by its own sensors where these settings have none."""
+        wanted = getattr(agent, "sensors", None)
+        sensors = self.sensors or (wanted if isinstance(wanted, Sensors) else Sensors())
+        return Flight(data, sensors, embodiment=self.embodiment, renderer=self.renderer, hints=self.hints)
 
     def settings(self) -> dict[str, Any]:
         """Settings that must not change within a run, as JSON without secrets; retries and rate limit may."""
@@ -121,30 +130,18 @@ class Limits:
     tokens: int | None = None  # The same, of input and output together
     failures_in_row: int = 5
 
-
-class BudgetTracker:
-    """Counts episodes and spending against the limits."""
-
-    def __init__(self, limits: Limits, cost_usd: float, tokens: int) -> None:
-        self._limits = limits
-        self.total = Finished(cost_usd=cost_usd, tokens=tokens)
-
-    @property
-    def failing(self) -> Failed | None:
-        """The failure that has occurred too often in a row; None if there is none."""
-        n = self._limits.failures_in_row
-        last = self.total.streak[-n:]
-        return last[-1] if len(last) == n and len({failed.kind for failed in last}) == 1 else None
-
-    @property
-    def spent(self) -> str:
-        """The limit that is reached, as its option; empty if none is."""
-        limits = self._limits
-        if limits.cost_usd is not None and self.total.cost_usd >= limits.cost_usd:
-            return f"--max-cost {limits.cost_usd:g}"
-        if limits.tokens is not None and self.total.tokens >= limits.tokens:
-            return f"--max-tokens {limits.tokens}"
+    def reached(self, total: Finished) -> str:
+        """Return the limit that is reached, as its option; empty if none is."""
+        if self.cost_usd is not None and total.cost_usd >= self.cost_usd:
+            return f"--max-cost {self.cost_usd:g}"
+        if self.tokens is not None and total.tokens >= self.tokens:
+            return f"--max-tokens {self.tokens}"
         return ""
+
+    def failing(self, total: Finished) -> str:
+        """Return the kind of failure that has occurred too often in a row; empty if there is none."""
+        last = [failed.kind for failed in total.streak[-self.failures_in_row :]]
+        return last[-1] if len(last) == self.failures_in_row and len(set(last)) == 1 else ""
 
 
 def agent_code_digest(agent: str) -> str:
@@ -153,15 +150,10 @@ def agent_code_digest(agent: str) -> str:
     parts = dict(code_of("aerialdojo_gen.benchmark.worker").parts)
     if module.split(".")[0] == "aerialdojo_gen":
         parts |= code_of(module).parts
-    elif (path := _file_of(module)) is not None:
-        parts[module] = file_digest(path)
+    else:
+        add_working_directory()
+        with contextlib.suppress(ImportError, ValueError):
+            spec = importlib.util.find_spec(module)
+            if spec is not None and spec.origin and (path := Path(spec.origin)).is_file():
+                parts[module] = file_digest(path)
     return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
-
-
-def _file_of(module: str) -> Path | None:
-    add_working_directory()
-    try:
-        spec = importlib.util.find_spec(module)
-    except (ImportError, ValueError):
-        return None
-    return Path(spec.origin) if spec is not None and spec.origin and Path(spec.origin).is_file() else None

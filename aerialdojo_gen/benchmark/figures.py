@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import io
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from aerialdojo_gen.benchmark.metrics import PAPER_METRICS, Profile, success_curve, summarize
+from aerialdojo_gen.benchmark.metrics import MEASURES, PAPER_METRICS, Profile, success_curve, summarize
 from aerialdojo_gen.benchmark.runs import GROUP_OF, UPPER_BOUND, Run
 from aerialdojo_gen.store.schemas import FAMILIES
 
@@ -29,11 +30,21 @@ _STYLE: dict[Any, Any] = {
 }  # fmt: skip
 
 
+@contextmanager
+def _styled(size_inches: tuple[float, float]) -> Iterator[Figure]:
+    """Make a figure in the common style, to be drawn in the block; nothing of it stays behind."""
+    # Not pyplot: that keeps figures for a screen that nobody looks at.
+    import matplotlib
+    from matplotlib.figure import Figure
+
+    with matplotlib.rc_context(_STYLE):
+        yield Figure(size_inches, layout="constrained")
+
+
 def radius_curve(runs: Sequence[Run], profile: Profile) -> Figure:
     """Draw overall SR (solid) and OSR (dashed) against the success radius, from 0 to 25 m."""
     radii = np.linspace(0.0, 25.0, 501)
-
-    def draw(figure: Figure) -> None:
+    with _styled((6.0, 3.4)) as figure:
         axes = figure.subplots()
         for k, run in enumerate(runs):
             sr, osr = success_curve(run.episodes, profile, radii)
@@ -52,19 +63,6 @@ def radius_curve(runs: Sequence[Run], profile: Profile) -> Figure:
         axes.grid(True)
         axes.spines[["top", "right"]].set_visible(False)
         figure.legend(loc="outside right upper", frameon=False)
-
-    return draw_figure(draw, (6.0, 3.4))
-
-
-def draw_figure(draw: Callable[[Figure], None], size_inches: tuple[float, float]) -> Figure:
-    """Draw a figure in the common style; nothing of it stays behind."""
-    # Not pyplot: that keeps figures for a screen that nobody looks at.
-    import matplotlib
-    from matplotlib.figure import Figure
-
-    with matplotlib.rc_context(_STYLE):
-        figure = Figure(size_inches, layout="constrained")
-        draw(figure)
     return figure
 
 
@@ -80,21 +78,15 @@ def encode_figure(figure: Figure, kind: str) -> bytes:
     return out.getvalue()
 
 
-_LABELS = {"sr": "SR", "osr": "OSR", "spl": "SPL", "dts_m": "DTS", "cr": "CR"}
-_UNITS = {metric: "m" if metric == "dts_m" else "%" for metric in PAPER_METRICS}
-_INWARDS = ("dts_m", "cr")
+_UNITS = {metric: "m" if MEASURES[metric].metres else "%" for metric in PAPER_METRICS}
+_INWARDS = [metric for metric in PAPER_METRICS if MEASURES[metric].direction < 0]
 _RINGS = 4
 # An axis ends at one of these times a power of ten: all are divided into four without odd digits.
 _ENDS = (1.0, 2.0, 4.0, 6.0, 8.0, 10.0)
 _FAMILIES = tuple(FAMILIES.values())
+_Curve = tuple[int, str, Any]  # Number of the run, its label, and shares of the way from the centre outwards
 # Where the axes of the paper's Fig. 5 end: per cent and metres.
 PAPER_ENDS = {"sr": 5.0, "osr": 15.0, "spl": 5.0, "dts_m": 40.0, "cr": 100.0}
-
-
-def contenders(runs: Sequence[Run]) -> list[tuple[int, Run]]:
-    """Return the runs that are drawn, with their place among all: without the oracle, which would fix every scale."""
-    drawn = [(k, run) for k, run in enumerate(runs) if GROUP_OF.get(run.agent) != UPPER_BOUND]
-    return drawn or list(enumerate(runs))
 
 
 def axis_end(largest: float, most: float = math.inf) -> float:
@@ -106,86 +98,71 @@ def axis_end(largest: float, most: float = math.inf) -> float:
 
 
 def metric_radars(runs: Sequence[Run], profile: Profile, paper_axes: bool = False) -> Figure:
-    """Draw a chart a metric, an axis a family; `paper` takes the paper's axes."""
-    values, ends = _values(runs, profile, paper_axes)
-    angles = np.linspace(0.0, 2.0 * math.pi, len(_FAMILIES), endpoint=False)
-
-    def draw(figure: Figure) -> None:
+    """Draw a chart a metric, an axis a family; `paper_axes` takes the paper's axes."""
+    curves, ends, note = _curves(runs, profile, paper_axes)
+    with _styled((7.6, 5.4)) as figure:
         panels: Any = figure.subplots(2, 3, subplot_kw={"projection": "polar"}).ravel()
-        for m, (axes, metric) in enumerate(zip(panels, PAPER_METRICS, strict=False)):
-            curves = [(k, run.label, values[n][:, m]) for n, (k, run) in enumerate(contenders(runs))]
-            _chart(axes, angles, curves, [(metric, ends[m])] * len(angles), _FAMILIES)
-            arrow = "↓" if metric in _INWARDS else "↑"
-            axes.set_title(f"{_LABELS[metric]} {arrow}, {_UNITS[metric]}", pad=34, size=10, weight="bold")
-            centre = f"{ends[m] if metric in _INWARDS else 0:g} at the centre"
+        for m, (axes, metric, end) in enumerate(zip(panels, PAPER_METRICS, ends, strict=False)):
+            _chart(axes, [(k, label, shares[:, m]) for k, label, shares in curves], _FAMILIES)
+            axes.set_title(f"{MEASURES[metric].head}, {_UNITS[metric]}", pad=34, size=10, weight="bold")
+            centre = f"{end if metric in _INWARDS else 0:g} at the centre"
             axes.text(0.5, 1.18, centre, transform=axes.transAxes, ha="center", size=7, color="#777777")
-            _ring_labels(axes, metric, ends[m], math.pi / len(angles))
+            _ring_labels(axes, metric, end, math.pi / len(_FAMILIES))
         panels[-1].set_axis_off()
         panels[-1].legend(
-            *panels[0].get_legend_handles_labels(), loc="center", frameon=False, title=_note(runs), title_fontsize=8
+            *panels[0].get_legend_handles_labels(), loc="center", frameon=False, title=note, title_fontsize=8
         )
-
-    return draw_figure(draw, (7.6, 5.4))
+    return figure
 
 
 def family_radars(runs: Sequence[Run], profile: Profile, paper_axes: bool = False) -> Figure:
     """Draw a chart a family, an axis a metric; an axis ends at the same value in all of them, or at the paper's."""
-    values, ends = _values(runs, profile, paper_axes)
-    angles = np.linspace(0.0, 2.0 * math.pi, len(PAPER_METRICS), endpoint=False)
-    tips = [
-        f"{_LABELS[m]}\n{'0' if m in _INWARDS else f'{end:g}'} {_UNITS[m]}"
-        for m, end in zip(PAPER_METRICS, ends, strict=True)
-    ]
-    middle = ", ".join(
-        f"{_LABELS[m]} {end if m in _INWARDS else 0:g} {_UNITS[m]}"
-        for m, end in zip(PAPER_METRICS, ends, strict=True)
-    )
-
-    def draw(figure: Figure) -> None:
+    curves, ends, note = _curves(runs, profile, paper_axes)
+    tips, middle = [], []
+    for metric, end in zip(PAPER_METRICS, ends, strict=True):
+        label, (inner, outer) = MEASURES[metric].head[:-2], sorted((0.0, end), reverse=metric in _INWARDS)
+        tips.append(f"{label}\n{outer:g} {_UNITS[metric]}")
+        middle.append(f"{label} {inner:g} {_UNITS[metric]}")
+    with _styled((6.8, 7.0)) as figure:
         panels: Any = figure.subplots(2, 2, subplot_kw={"projection": "polar"}).ravel()
         for f, (axes, family) in enumerate(zip(panels, _FAMILIES, strict=True)):
-            curves = [(k, run.label, values[n][f]) for n, (k, run) in enumerate(contenders(runs))]
-            _chart(axes, angles, curves, list(zip(PAPER_METRICS, ends, strict=True)), tips)
+            _chart(axes, [(k, label, shares[f]) for k, label, shares in curves], tips)
             axes.set_title(family, pad=36, size=10, weight="bold")
-        handles, labels = panels[0].get_legend_handles_labels()
         figure.legend(
-            handles, labels, loc="outside lower center", ncols=4, frameon=False, title=_note(runs), title_fontsize=8
-        )
-        figure.suptitle(f"At the centre: {middle}", size=8, color="#555555")
-
-    return draw_figure(draw, (6.8, 7.0))
-
-
-def _note(runs: Sequence[Run]) -> str | None:
-    return "without the oracle" if len(contenders(runs)) < len(runs) else None
+            *panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=4, frameon=False, title=note,
+            title_fontsize=8,
+        )  # fmt: skip
+        figure.suptitle(f"At the centre: {', '.join(middle)}", size=8, color="#555555")
+    return figure
 
 
-def _values(runs: Sequence[Run], profile: Profile, paper_axes: bool) -> tuple[list[Any], list[float]]:
-    """Score the families: for every run (4, 5) float64, per cent and metres; and where the axes end."""
+def _curves(runs: Sequence[Run], profile: Profile, paper_axes: bool) -> tuple[list[_Curve], list[float], str | None]:
+    """Score the families of every run, (4, 5), as shares of the way outwards; where axes end; a note on who lacks."""
+    # Without the oracle, which would fix every scale.
+    drawn = [(k, run) for k, run in enumerate(runs) if GROUP_OF.get(run.agent) != UPPER_BOUND] or [*enumerate(runs)]
+    most = np.array([math.inf if MEASURES[metric].metres else 100.0 for metric in PAPER_METRICS])
     found = []
-    for _, run in contenders(runs):
+    for _, run in drawn:
         families = summarize(run.episodes, profile).families
         rows = [
             [math.nan if family not in families else getattr(families[family], m) for m in PAPER_METRICS]
             for family in _FAMILIES
         ]
-        found.append(np.array(rows) * [1.0 if m == "dts_m" else 100.0 for m in PAPER_METRICS])
+        found.append(np.array(rows) * np.where(np.isinf(most), 1.0, most))
     if paper_axes:
-        return found, [PAPER_ENDS[metric] for metric in PAPER_METRICS]
-    largest = np.nanmax(np.stack(found), axis=(0, 1))
-    most = [math.inf if metric == "dts_m" else 100.0 for metric in PAPER_METRICS]
-    return found, [axis_end(float(value), limit) for value, limit in zip(largest, most, strict=True)]
+        ends = [PAPER_ENDS[metric] for metric in PAPER_METRICS]
+    else:
+        ends = [*map(axis_end, np.nanmax(np.stack(found), axis=(0, 1)).tolist(), most.tolist())]
+    inwards = [metric in _INWARDS for metric in PAPER_METRICS]
+    shares = [np.clip(np.where(inwards, 1.0 - own / ends, own / ends), 0.0, 1.0) for own in found]
+    curves = [(k, run.label, own) for (k, run), own in zip(drawn, shares, strict=True)]
+    return curves, ends, "without the oracle" if len(drawn) < len(runs) else None
 
 
-def _chart(
-    axes: Any, angles: Any, curves: Sequence[tuple[int, str, Any]], scales: Sequence[tuple[str, float]],
-    tips: Sequence[str],
-) -> None:  # fmt: skip
-    """Draw one radar: every value as its share of the way from the centre outwards."""
-    inwards = np.array([metric in _INWARDS for metric, _ in scales])
-    ends = np.array([end for _, end in scales])
-    for k, label, values in curves:
-        share = np.clip(np.where(inwards, 1.0 - values / ends, values / ends), 0.0, 1.0)
+def _chart(axes: Any, curves: Sequence[_Curve], tips: Sequence[str]) -> None:
+    """Draw one radar, an axis a tip."""
+    angles = np.linspace(0.0, 2.0 * math.pi, len(tips), endpoint=False)
+    for k, label, share in curves:
         colour = COLOURS[k % len(COLOURS)]
         # Where curves coincide, the later ones are smaller marks on the earlier.
         axes.plot(

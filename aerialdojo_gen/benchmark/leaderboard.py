@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import accumulate, groupby
 from pathlib import Path
+from typing import NamedTuple
 
 from aerialdojo_gen.base.errors import StoreError
-from aerialdojo_gen.base.paper_figures import PaperResult, results
+from aerialdojo_gen.base.paper_figures import results
 from aerialdojo_gen.base.version import __version__
 from aerialdojo_gen.benchmark.metrics import DEFAULT_PROFILES, MEASURES, METRICS, PROFILES
 from aerialdojo_gen.benchmark.registry import NAMES_OF
@@ -22,43 +22,32 @@ _NEAR_M, _FAR_M = (PROFILES[name].radius_m for name in DEFAULT_PROFILES)
 _TITLES = NAMES_OF | {"all": "All settings"}
 
 
-@dataclass(frozen=True)
-class Head:
-    """A column of scores."""
-
-    group: str
-    metric: str
-    radius_m: float
-    partition: str
-    adapted: bool | None = None  # Only of agents that were, or were not, trained on OOD scenes; None for all
-
-
-_HEADS = (
-    *(Head(f"all scenes, {_NEAR_M:g} m", metric, _NEAR_M, "all") for metric in METRICS),
-    *(Head(f"{_FAR_M:g} m", metric, _FAR_M, "all") for metric in ("sr", "osr")),
-    *(Head("ID", metric, _NEAR_M, "ID") for metric in ("sr", "spl")),
-    *(Head("OOD", metric, _NEAR_M, "OOD", False) for metric in ("sr", "spl")),
-    *(Head("OOD, adapted", metric, _NEAR_M, "OOD", True) for metric in ("sr", "spl")),
-)
+# An adapted agent's scores of OOD scenes are in a partition of their own.
+_ADAPTED = "OOD, adapted"
+# What a column shows: metric, radius and partition; by the heading over it.
+_Key = tuple[str, float, str]
+_HEADS: dict[_Key, str] = {
+    **{(metric, _NEAR_M, "all"): f"all scenes, {_NEAR_M:g} m" for metric in METRICS},
+    **{(metric, _FAR_M, "all"): f"{_FAR_M:g} m" for metric in ("sr", "osr")},
+    **{(metric, _NEAR_M, part): part for part in ("ID", "OOD", _ADAPTED) for metric in ("sr", "spl")},
+}
 
 
-@dataclass(frozen=True)
-class Cell:
+class Cell(NamedTuple):
     """A figure, with its interval or deviation."""
 
-    value: float | None
-    shown: str
+    value: float | None = None
+    shown: str = NONE
     spread: str = ""
 
 
-@dataclass(frozen=True)
-class Row:
+class Row(NamedTuple):
     """A row: a scored run, or one of the paper's."""
 
     label: str
     agent: str
     episodes: int | None
-    cells: Sequence[Cell]
+    cells: Mapping[_Key, Cell]
     is_paper: bool = False
 
 
@@ -69,15 +58,16 @@ def write_leaderboard(folder: Path, page: Path) -> int:
         raise StoreError(
             f"{folder} has no scored run (*/{SCORE}): score a submission with score FILE --into {folder}"
         )
-    scored = [(card, row) for card in cards for row in card.rows]
-    heads = [head for head in _HEADS if any(_has(head, row, card.adapted) for card, row in scored)]
-    groups = [(group, len(list(part))) for group, part in groupby(heads, key=lambda head: head.group)]
-    tables = {_TITLES[setting]: _lines(cards, setting, heads) for setting in (*SETTINGS, "all")}
+    tables = {_TITLES[setting]: _lines(cards, setting) for setting in (*SETTINGS, "all")}
+    known = {key for lines in tables.values() for line in lines if not line.is_paper for key in line.cells}
+    heads = [key for key in _HEADS if key in known]
+    groups = [(group, len(list(part))) for group, part in groupby(heads, key=_HEADS.__getitem__)]
     template = page_environment().get_template("leaderboard.html.j2")
     html = template.render(
         version=__version__,
         cards=cards,
         heads=heads,
+        nothing=Cell(),
         measures=MEASURES,
         groups=groups,
         starts={0, *accumulate(count for _, count in groups)},
@@ -90,39 +80,28 @@ def write_leaderboard(folder: Path, page: Path) -> int:
     return len(cards)
 
 
-def _has(head: Head, row: ScoreRow, adapted: bool) -> bool:
-    at = row.partition, row.radius_m
-    return at == (head.partition, head.radius_m) and _cell(head, row, adapted).value is not None
-
-
-def _lines(cards: Sequence[ScoreCard], setting: str, heads: Sequence[Head]) -> list[Row]:
+def _lines(cards: Sequence[ScoreCard], setting: str) -> list[Row]:
     """Make the rows of a setting, the highest success rate first."""
     lines = []
     for card in cards:
-        rows = {(row.partition, row.radius_m): row for row in card.rows if row.setting == setting}
+        rows = [row for row in card.rows if row.setting == setting]
         if rows:
-            cells = [_cell(head, rows.get((head.partition, head.radius_m)), card.adapted) for head in heads]
+            cells = {key: cell for row in rows for key, cell in _cells(row, card.adapted)}
             label = f"{card.name} + {card.told}" if card.told else card.name
-            lines.append(Row(label, card.agent, rows["all", _NEAR_M].episodes, cells))
-    lines += [_paper_row(result, heads) for result in results() if result.setting == setting]
-    return sorted(lines, key=lambda line: -(line.cells[0].value or 0.0))
+            whole = next(row.episodes for row in rows if (row.partition, row.radius_m) == ("all", _NEAR_M))
+            lines.append(Row(label, card.agent, whole, cells))
+    for result in results():
+        if result.setting == setting:
+            spread = {key: f"± {text(key[0], value)}" for key, value in result.spread.items()}
+            cells = {(*key, "all"): Cell(v, text(key[0], v), spread[key]) for key, v in result.mean.items()}
+            lines.append(Row(result.model, "paper", None, cells, is_paper=True))
+    return sorted(lines, key=lambda line: -(line.cells.get(("sr", _NEAR_M, "all"), Cell()).value or 0.0))
 
 
-def _cell(head: Head, row: ScoreRow | None, adapted: bool) -> Cell:
-    value = None if row is None or head.adapted not in (None, adapted) else row.mean.get(head.metric)
-    if row is None or value is None:
-        return Cell(None, NONE)
-    low, high = row.low.get(head.metric), row.high.get(head.metric)
-    ends = "" if low is None or high is None else f"{text(head.metric, low)}–{text(head.metric, high)}"
-    return Cell(value, text(head.metric, value), ends)
-
-
-def _paper_row(result: PaperResult, heads: Sequence[Head]) -> Row:
-    cells = []
-    for head in heads:
-        key = head.metric, head.radius_m
-        value = result.mean.get(key) if head.partition == "all" else None
-        spread = result.spread.get(key)
-        shown = f"± {text(head.metric, spread)}" if value is not None and spread is not None else ""
-        cells.append(Cell(value, NONE if value is None else text(head.metric, value), shown))
-    return Row(result.model, "paper", None, cells, is_paper=True)
+def _cells(row: ScoreRow, adapted: bool) -> Iterator[tuple[_Key, Cell]]:
+    partition = _ADAPTED if adapted and row.partition == "OOD" else row.partition
+    for metric, value in row.mean.items():
+        if value is not None:
+            low, high = row.low.get(metric), row.high.get(metric)
+            ends = "" if low is None or high is None else f"{text(metric, low)}–{text(metric, high)}"
+            yield (metric, row.radius_m, partition), Cell(value, text(metric, value), ends)

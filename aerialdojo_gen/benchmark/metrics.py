@@ -1,20 +1,22 @@
-"""Success rules, outcomes of episodes under a rule, and scores: SR, SR-view, OSR, SPL, DTS and CR.
+"""Success rules, outcomes of episodes under a rule, and scores with their intervals: SR, SR-view, OSR, SPL, DTS, CR.
 
 A scene's score is the mean of its episodes, a family's the mean of its scenes, the overall score the mean of the
 families (paper, section on evaluation); ± is the standard deviation over scenes. SR-view is not in the paper.
+Episodes of one scene are alike, so they are no independent draws: intervals resample scenes within their family.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from aerialdojo_gen.base import rng
 from aerialdojo_gen.base.errors import StoreError
 from aerialdojo_gen.base.names import check_known
 from aerialdojo_gen.store.schemas import FAMILIES
@@ -78,123 +80,97 @@ def at_radius(profile: Profile, radius_m: float) -> Profile:
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 Strings = NDArray[np.str_]
-
-
-@dataclass(frozen=True)
-class Episodes:
-    """Columns of an episode log, all of one length."""
-
-    scene: Strings  # (n,) str; what the episode belongs to
-    family: Strings
-    scene_type: Strings
-    partition: Strings
-    setting: Strings
-    modality: Strings
-    stop_called: Bools  # (n,) bool; how it ended; both may hold in one step
-    collision: Bools
-    n_actions: NDArray[np.int64]  # (n,) int64; actions taken, Stop included, and how many were allowed
-    action_budget: NDArray[np.int64]
-    final_distance_m: Floats  # (n,) float64
-    min_distance_m: Floats
-    final_horizontal_distance_m: Floats  # (n,) float64; the same in the plane
-    min_horizontal_distance_m: Floats
-    path_length_m: Floats  # (n,) float64; way flown, ℓ
-    reference_length_m: Floats  # (n,) float64
-    euclidean_m: Floats  # (n,) float64; straight distance from start to goal
-    view_distance_m: Floats  # (n,) float64
-
-    def __len__(self) -> int:
-        """Return the number of episodes."""
-        return len(self.scene)
-
-    def where(self, mask: Bools | NDArray[np.int64]) -> Episodes:
-        """Return the episodes that a mask or indices select."""
-        return replace(self, **{f.name: getattr(self, f.name)[mask] for f in fields(self)})
-
+# A structured array, (n,): a field a column of the log, and `view_distance_m`. Distances and lengths are metres.
+Episodes = NDArray[np.void]
 
 _KINDS: dict[str, Any] = {
     **dict.fromkeys(("scene", "family", "scene_type", "partition", "setting", "modality"), np.str_),
-    **dict.fromkeys(("stop_called", "collision"), np.bool_),
+    **dict.fromkeys(("stop_called", "collision"), np.bool_),  # Both may hold in one step
     **dict.fromkeys(("n_actions", "action_budget"), np.int64),
 }
+_LENGTHS = (
+    "final_distance_m", "min_distance_m", "final_horizontal_distance_m", "min_horizontal_distance_m", "path_length_m",
+    "reference_length_m", "euclidean_m",
+)  # fmt: skip
 
 
 def episodes_of(table: pa.Table) -> Episodes:
     """Take the metrics' columns out of a table of episodes, and check them."""
-    names = [field.name for field in fields(Episodes) if field.name != "view_distance_m"]
-    columns = {name: np.asarray(table[name].to_pylist(), dtype=_KINDS.get(name, np.float64)) for name in names}
+    kinds = _KINDS | dict.fromkeys(_LENGTHS, np.float64)
+    columns = {name: np.asarray(table[name].to_pylist(), dtype=kind) for name, kind in kinds.items()}
     # A table that an older version has written may lack the views.
     distance, sight = (
         table[name].to_pylist() if name in table.column_names else [None] * table.num_rows
         for name in ("viewpoint_distance_m", "target_in_sight")
     )
-    seen = [np.nan if d is None or s is None else d if s else np.inf for d, s in zip(distance, sight, strict=True)]
-    episodes = Episodes(**columns, view_distance_m=np.array(seen, dtype=np.float64))
-    if np.isnan(episodes.euclidean_m).any():
+    views = [np.nan if d is None or s is None else d if s else np.inf for d, s in zip(distance, sight, strict=True)]
+    if np.isnan(columns["euclidean_m"]).any():
         raise StoreError(
             "these episodes have no scores: the release withholds the goals; its owner scores a submission"
         )
-    for name in columns:
-        if name not in _KINDS and not (np.isfinite(columns[name]) & (columns[name] >= 0.0)).all():
+    for name in _LENGTHS:
+        if not (np.isfinite(columns[name]) & (columns[name] >= 0.0)).all():
             raise StoreError(f"episodes: {name} has values that are no length: run the evaluation again")
-    for nearest, last in (
-        (episodes.min_distance_m, episodes.final_distance_m),
-        (episodes.min_horizontal_distance_m, episodes.final_horizontal_distance_m),
-    ):
-        if (nearest > last + 1e-9).any():
+    for where in ("", "horizontal_"):
+        if (columns[f"min_{where}distance_m"] > columns[f"final_{where}distance_m"] + 1e-9).any():
             raise StoreError("episodes: a smallest distance exceeds the last one: run the evaluation again")
+    columns["view_distance_m"] = np.array(views, dtype=np.float64)
+    episodes = np.empty(table.num_rows, [(name, column.dtype) for name, column in columns.items()])
+    for name, column in columns.items():
+        episodes[name] = column
     return episodes
 
 
-@dataclass(frozen=True)
-class Outcomes:
-    """Outcomes of every episode under a profile."""
+class Outcomes(NamedTuple):
+    """Measures of every episode under a profile, (n,) each."""
 
-    success: Bools  # (n,) bool; σ; ever within the radius, whatever happens later; ended by a collision
-    success_view: Floats  # (n,) float64
-    oracle_success: Bools
-    spl: Floats  # (n,) float64; σ·L / max(L, ℓ), in [0, 1]
-    distance_m: Floats  # (n,) float64; distance to the goal at the end, metres
-    collision: Bools
+    sr: Bools  # Success, σ
+    sr_view: Floats  # NaN where views are not known
+    osr: Bools  # Ever within the radius, whatever happens later
+    spl: Floats  # σ·L / max(L, ℓ), in [0, 1]
+    dts_m: Floats  # Distance to the goal at the end, metres
+    cr: Bools  # Ended by a collision
 
 
-def outcomes(episodes: Episodes, profile: Profile) -> Outcomes:
-    """Judge every episode by a profile; one that begins at its goal has SPL 1 if it succeeds unmoved, else 0."""
+def outcomes(episodes: Episodes, profile: Profile, nearest_m: Floats | None = None) -> Outcomes:
+    """Judge every episode by a profile; one that begins at its goal has SPL 1 if it succeeds unmoved, else 0.
+
+    `nearest_m` stands in for the log's smallest distances, which are those at poses.
+    """
     final, nearest = distances(episodes, profile)
+    nearest = nearest if nearest_m is None else np.minimum(nearest_m, final)
     may = may_succeed(episodes, profile)
     success = may & (final <= profile.radius_m)
-    shortest = episodes.euclidean_m if profile.straight_reference else episodes.reference_length_m
-    longer = np.maximum(shortest, episodes.path_length_m)
+    shortest = episodes["euclidean_m"] if profile.straight_reference else episodes["reference_length_m"]
+    longer = np.maximum(shortest, episodes["path_length_m"])
     # Zero over zero: nothing to fly and nothing flown.
     efficiency = np.divide(shortest, longer, out=np.ones_like(shortest), where=longer > 0.0)
     spl = np.where(success, efficiency, 0.0)
-    view = np.where(may & (episodes.view_distance_m <= profile.radius_m), 1.0, 0.0)
+    view = np.where(may & (episodes["view_distance_m"] <= profile.radius_m), 1.0, 0.0)
     # The log has no distance to viewpoints in the plane.
-    view[np.isnan(episodes.view_distance_m) | profile.planar] = np.nan
-    return Outcomes(success, view, nearest <= profile.radius_m, spl, final, episodes.collision)
+    view[np.isnan(episodes["view_distance_m"]) | profile.planar] = np.nan
+    return Outcomes(success, view, nearest <= profile.radius_m, spl, final, episodes["collision"])
 
 
 def knows_views(episodes: Episodes, profile: Profile) -> bool:
     """Whether SR-view is known for any episode, by a profile."""
-    return not profile.planar and not bool(np.isnan(episodes.view_distance_m).all())
+    return not profile.planar and not bool(np.isnan(episodes["view_distance_m"]).all())
 
 
 def distances(episodes: Episodes, profile: Profile) -> tuple[Floats, Floats]:
     """Return the last and the smallest distance to the goal, (n,) float64, metres, as a profile measures them."""
-    if profile.planar:
-        final, nearest = episodes.final_horizontal_distance_m, episodes.min_horizontal_distance_m
-    else:
-        final, nearest = episodes.final_distance_m, episodes.min_distance_m
-    return final, np.minimum(nearest, final)
+    plane = "horizontal_" if profile.planar else ""
+    final = episodes[f"final_{plane}distance_m"]
+    return final, np.minimum(episodes[f"min_{plane}distance_m"], final)
 
 
 def may_succeed(episodes: Episodes, profile: Profile) -> Bools:
     """Which episodes succeed if they end near enough to the goal."""
-    may = episodes.n_actions <= episodes.action_budget
+    may = episodes["n_actions"] <= episodes["action_budget"]
     if profile.needs_stop:
-        may &= episodes.stop_called
+        may &= episodes["stop_called"]
     if profile.fails_on_collision:
-        may &= ~episodes.collision
+        may &= ~episodes["collision"]
     return may
 
 
@@ -206,40 +182,29 @@ class Score(NamedTuple):
     sr_view: float
     osr: float
     spl: float
-    dts_m: float  # Distance to the goal at the end of the episode, metres
+    dts_m: float
     cr: float
 
 
-@dataclass(frozen=True)
-class Measure:
-    """What is averaged over episodes."""
+class Measure(NamedTuple):
+    """How what is averaged over episodes is shown."""
 
-    name: str  # Field of `Score`
-    head: str  # Heading of its column
-    of: str  # Field of `Outcomes`
+    head: str  # Heading of its column; the arrow points to the better
     direction: int = 1  # 1 if higher is better, -1 if lower is
     metres: bool = False  # Else a share
 
 
 MEASURES = {
-    measure.name: measure
-    for measure in (
-        Measure("sr", "SR ↑", "success"),
-        Measure("sr_view", "SR-view ↑", "success_view"),
-        Measure("osr", "OSR ↑", "oracle_success"),
-        Measure("spl", "SPL ↑", "spl"),
-        Measure("dts_m", "DTS ↓", "distance_m", -1, metres=True),
-        Measure("cr", "CR ↓", "collision", -1),
-    )
+    "sr": Measure("SR ↑"),
+    "sr_view": Measure("SR-view ↑"),
+    "osr": Measure("OSR ↑"),
+    "spl": Measure("SPL ↑"),
+    "dts_m": Measure("DTS ↓", -1, metres=True),
+    "cr": Measure("CR ↓", -1),
 }
 METRICS = tuple(MEASURES)
 # The paper's own.
 PAPER_METRICS = tuple(metric for metric in METRICS if metric != "sr_view")
-
-
-def values_of(judged: Outcomes) -> Floats:
-    """Return the `METRICS` of every episode, (n, 6) float64."""
-    return np.stack([np.asarray(getattr(judged, measure.of), np.float64) for measure in MEASURES.values()], axis=1)
 
 
 def score(values: Floats) -> Score:
@@ -271,6 +236,13 @@ class Summary:
     overall: Score  # Mean of the families that are there
     deviation: Score  # Standard deviation over all scenes
 
+    def scene_scores(self) -> list[Floats]:
+        """Return the `METRICS` of every family's scenes, (scenes, 6) each."""
+        return [
+            np.array([score[1:] for name, score in self.scenes.items() if self.family_of[name] == family])
+            for family in self.families
+        ]
+
 
 def summarize_values(values: Floats, scene: Strings, family: Strings) -> Summary:
     """Average the `METRICS` of episodes, (n, 6), by scene, family and overall."""
@@ -288,14 +260,38 @@ def summarize_values(values: Floats, scene: Strings, family: Strings) -> Summary
 
 def summarize(episodes: Episodes, profile: Profile) -> Summary:
     """Average a log by scene, family and overall."""
-    return summarize_values(values_of(outcomes(episodes, profile)), episodes.scene, episodes.family)
+    return summarize_values(np.column_stack(outcomes(episodes, profile)), episodes["scene"], episodes["family"])
+
+
+RESAMPLES = 9_999
+
+
+def bootstrap(scenes: Sequence[Floats]) -> Floats:
+    """Return the 95 % percentile intervals, (2, 6), of the families' mean of scenes' `METRICS`; NaN for unknown."""
+    ends = np.full((2, len(METRICS)), math.nan)
+    if not scenes or min(map(len, scenes)) < 2:
+        return ends
+    from scipy.stats import bootstrap as resampled
+
+    # A measure that is not known of a scene has no interval, and leaves the others theirs.
+    known = np.all([np.isfinite(part).all(axis=0) for part in scenes], axis=0)
+
+    def mean_of_families(*parts: Any, axis: int) -> Any:
+        return sum(np.mean(part, axis=axis) for part in parts) / len(parts)
+
+    found = resampled(
+        tuple(part[:, known] for part in scenes), mean_of_families, n_resamples=RESAMPLES, confidence_level=0.95,
+        axis=0, method="percentile", rng=rng.generator(0, "bootstrap", *map(len, scenes)),
+    ).confidence_interval  # fmt: skip
+    ends[:, known] = found.low, found.high
+    return ends
 
 
 def success_curve(episodes: Episodes, profile: Profile, radii_m: Floats) -> tuple[Floats, Floats]:
     """Overall SR and OSR, fractions (r,), at radii in metres, everything else by the profile."""
     # An episode's share of the overall mean: its scene's among its family's scenes, its family's among the families.
-    _, first, scene, flown = np.unique(episodes.scene, return_index=True, return_inverse=True, return_counts=True)
-    families, family, scenes = np.unique(episodes.family[first], return_inverse=True, return_counts=True)
+    _, first, scene, flown = np.unique(episodes["scene"], return_index=True, return_inverse=True, return_counts=True)
+    families, family, scenes = np.unique(episodes["family"][first], return_inverse=True, return_counts=True)
     weight = (1.0 / (flown * scenes[family] * len(families)))[scene]
     final, nearest = distances(episodes, profile)
     may = may_succeed(episodes, profile)

@@ -13,8 +13,17 @@ import pyarrow.compute as pc
 from aerialdojo_gen.base import rng
 from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.base.text_table import Column, TextTable
-from aerialdojo_gen.benchmark.intervals import RESAMPLES, bootstrap, scene_scores
-from aerialdojo_gen.benchmark.metrics import MEASURES, METRICS, Floats, Profile, knows_views, outcomes, summarize
+from aerialdojo_gen.benchmark.metrics import (
+    MEASURES,
+    METRICS,
+    RESAMPLES,
+    Floats,
+    Profile,
+    bootstrap,
+    knows_views,
+    outcomes,
+    summarize,
+)
 from aerialdojo_gen.benchmark.runs import Run
 from aerialdojo_gen.benchmark.tables import NONE, profile_head, text
 
@@ -39,13 +48,13 @@ def _table(first: Run, second: Run, profile: Profile) -> TextTable:
     from scipy.stats import binomtest
 
     summaries = [summarize(run.episodes, profile) for run in (first, second)]
-    one, other = (scene_scores(summary) for summary in summaries)
+    one, other = (summary.scene_scores() for summary in summaries)
     families = [y - x for x, y in zip(one, other, strict=True)]
     low, high = bootstrap(families)
     # A scene's share of the overall mean: its family's among the families, its own within its family.
     weight = np.concatenate([np.full(len(part), 1.0 / (len(part) * len(families))) for part in families])
     p = _chances(np.concatenate(one), np.concatenate(other), weight)
-    x, y = (outcomes(run.episodes, profile).success for run in (first, second))
+    x, y = (outcomes(run.episodes, profile).sr for run in (first, second))
     only_first, only_second = int(np.sum(x & ~y)), int(np.sum(y & ~x))
     torn = only_first + only_second
     exact = float(binomtest(only_first, torn).pvalue) if torn else 1.0

@@ -34,56 +34,45 @@ _MAX_REVERSALS = 6
 _MEANS = "Mean of the {0}families, each the mean of its scenes; ± is the standard deviation over scenes."
 
 
-def _ranked(run: Run, group: str = "") -> str | None:
-    """Return a run's rank group; the oracle is not ranked."""
-    return None if GROUP_OF.get(run.agent) == UPPER_BOUND else group
-
-
-def run_rows(request: ReportRequest) -> list[Row]:
-    """Make a row a run, under its group's heading."""
-    return [
-        Row(run.label, Cut(k), run.group, _ranked(run), _leading(run, len(run.episodes)))
-        for k, run in enumerate(request.runs)
-    ]
-
-
-def _leading(run: Run, episodes: int) -> dict[str, str]:
-    return {"episodes": f"{episodes:,}", "hints": run.hints or "none"}
+def run_rows(
+    request: ReportRequest, section: str | None = None, where: tuple[tuple[str, str], ...] = ()
+) -> list[Row]:
+    """Make a row a run that has such episodes, under a section's heading or its group's."""
+    rows = []
+    for k, run in enumerate(request.runs):
+        cut = Cut(k, where=where)
+        if n := int(request.mask(cut).sum()):
+            leading = {"episodes": f"{n:,}", "hints": run.hints or "none"}
+            heading = run.group if section is None else section
+            is_oracle = GROUP_OF.get(run.agent) == UPPER_BOUND  # It is not ranked
+            rows.append(Row(run.label, cut, heading, None if is_oracle else section or "", leading))
+    return rows
 
 
 def _headline_rows(request: ReportRequest) -> list[Row]:
     """Make the rows of all episodes, of those with a held-out object, and of those outside the two malls."""
-    rows, table = run_rows(request), request.broken_down
-    share = float(np.mean(table.columns["malls"] == "malls"))
+    rows = run_rows(request)
+    share = float(np.mean(request.column("malls") == "malls"))
     for section, column, value in (
         ("target or start object held out (target_split = test)", "target_split", "test"),
         (f"without the two malls ({100 * share:.0f} % of the episodes)", "malls", "other scenes"),
     ):
-        if column not in table.columns or len(table.values(column, Cut())) < 2:
-            continue
-        for k, run in enumerate(request.runs):
-            cut = Cut(k, where=((column, value),))
-            if n := int(table.mask(cut).sum()):
-                rows.append(Row(run.label, cut, section, _ranked(run, section), _leading(run, n)))
+        if column in ("malls", *request.breakdowns.found) and len(request.values(column, Cut())) > 1:
+            rows += run_rows(request, section, ((column, value),))
     return rows
 
 
 def _setting_rows(request: ReportRequest) -> list[Row]:
-    return [
-        Row(run.label, Cut(k, where=(("setting", setting),)), NAMES_OF[setting], _ranked(run, NAMES_OF[setting]))
-        for setting in SETTINGS
-        for k, run in enumerate(request.runs)
-        if (run.episodes.setting == setting).any()
-    ]
+    return [row for name in SETTINGS for row in run_rows(request, NAMES_OF[name], (("setting", name),))]
 
 
 def _scene_rows(request: ReportRequest) -> list[Row]:
-    return [Row(n, Cut(where=(("scene", n),)), rank_group=None) for n in request.table.values("scene", Cut())]
+    return [Row(n, Cut(where=(("scene", n),)), rank_group=None) for n in request.values("scene", Cut())]
 
 
 def _type_rows(request: ReportRequest) -> list[Row]:
-    columns, order = request.table.columns, list(FAMILIES.values())
-    family_of = dict(zip(columns["scene_type"].tolist(), columns["family"].tolist(), strict=True))
+    order = list(FAMILIES.values())
+    family_of = dict(zip(request.column("scene_type").tolist(), request.column("family").tolist(), strict=True))
     types = sorted(family_of, key=lambda t: (order.index(f) if (f := family_of[t]) in order else len(order), t))
     return [Row(name, Cut(where=(("scene_type", name),)), family_of[name], None) for name in types]
 
@@ -98,7 +87,7 @@ def _by(request: ReportRequest, column: str, heads: Sequence[str] = (), *, gap: 
     named = heads or [NAMES_OF.get(value, value) for value in values]
     cuts = [Cut(where=((column, value),)) for value in values]
     parts = dict(zip(named, cuts, strict=True))
-    if ADAPTED not in request.table.values("partition", Cut()):
+    if ADAPTED not in request.values("partition", Cut()):
         parts.pop(ADAPTED, None)
     rates = {"sr": "SR", "osr": "OSR"} if gap else {}
     gaps = [Cell(gap, name, cuts[1], head, (name, cuts[0])) for name, head in rates.items()]
@@ -107,10 +96,6 @@ def _by(request: ReportRequest, column: str, heads: Sequence[str] = (), *, gap: 
 
 def _by_run(request: ReportRequest) -> list[Cell]:
     return [Cell(run.label, name, Cut(k)) for k, run in enumerate(request.runs) for name in request.shown()]
-
-
-def _by_average(request: ReportRequest) -> list[Cell]:
-    return _cells({"mean of the families": Cut(), "mean of the tasks": Cut(weighted=True)}, request.shown())
 
 
 def _by_profile(request: ReportRequest, metrics: Sequence[str]) -> list[Cell]:
@@ -135,10 +120,9 @@ def _along_way(request: ReportRequest) -> bool:
 def _by_radius(request: ReportRequest) -> list[Cell]:
     radii = sorted(set(request.radii_m))
     at = {r: Cut(profile=at_radius(request.profiles[0], r)) for r in radii}
-    cells = [Cell("SR ↑", "sr", at[r], f"{r:g} m") for r in radii]
-    cells += [Cell("OSR, at poses ↑", "osr", at[r], f"{r:g} m") for r in radii]
-    if _along_way(request):
-        cells += [Cell("OSR, along the way ↑", "osr", at[r] | Cut(along_way=True), f"{r:g} m") for r in radii]
+    rates = [("SR ↑", "sr", Cut()), ("OSR, at poses ↑", "osr", Cut())]
+    rates += [("OSR, along the way ↑", "osr", Cut(along_way=True))] if _along_way(request) else []
+    cells = [Cell(head, name, at[r] | how, f"{r:g} m") for head, name, how in rates for r in radii]
     cells += [
         Cell("SR gain, points", "sr", at[far], f"{near:g}→{far:g} m", ("sr", at[near]))
         for near, far in pairwise(radii)
@@ -154,11 +138,8 @@ def _radius_notes(request: ReportRequest) -> list[str]:
     for section in dict.fromkeys(row.section for row in rows):
         for near, far in pairwise(sorted(set(request.radii_m))):
             at = [Cut(profile=at_radius(request.profiles[0], radius)) for radius in (near, far)]
-            rates = [
-                (row.label, request.table.score(at[0] | row.cut).sr, request.table.score(at[1] | row.cut).sr)
-                for row in rows
-                if row.section == section
-            ]
+            own = [row for row in rows if row.section == section]
+            rates = [(row.label, request.score(at[0] | row.cut).sr, request.score(at[1] | row.cut).sr) for row in own]
             # Differences in the last digits are sums in another order.
             turned = [
                 f"{up} overtakes {down}"
@@ -168,25 +149,23 @@ def _radius_notes(request: ReportRequest) -> list[str]:
             ]
             if turned:
                 more = f", and {len(turned) - _MAX_REVERSALS} more" if len(turned) > _MAX_REVERSALS else ""
-                said = f"{', '.join(turned[:_MAX_REVERSALS])}{more}."
-                notes.append(f"{section}, from {near:g} to {far:g} m: {said}")
+                listed = ", ".join(turned[:_MAX_REVERSALS])
+                notes.append(f"{section}, from {near:g} to {far:g} m: {listed}{more}.")
     return notes
 
 
 def _adapted_notes(runs: Sequence[Run]) -> list[str]:
     """Name the runs whose agents were trained on OOD scenes."""
-    scenes = {run.label: len(set(run.episodes.scene[run.episodes.partition == ADAPTED])) for run in runs}
-    said = [f"{label}, {n} scene{'s' * (n > 1)}" for label, n in scenes.items() if n]
-    return (
-        [f"{ADAPTED}: OOD scenes whose training tasks the agent was trained on: {'; '.join(said)}."] if said else []
-    )
+    scenes = {run.label: len(set(run.episodes["scene"][run.episodes["partition"] == ADAPTED])) for run in runs}
+    listed = "; ".join(f"{label}, {n} scene{'s' * (n > 1)}" for label, n in scenes.items() if n)
+    return [f"{ADAPTED}: OOD scenes whose training tasks the agent was trained on: {listed}."] if listed else []
 
 
 def caveats(runs: Sequence[Run]) -> list[str]:
     """Notes on what a comparison of runs lacks: families, episodes, SR-view, common tasks."""
     lacking: dict[tuple[str, ...], list[str]] = {}
     for run in runs:
-        if missing := tuple(f for f in FAMILIES.values() if not (run.episodes.family == f).any()):
+        if missing := tuple(f for f in FAMILIES.values() if not (run.episodes["family"] == f).any()):
             lacking.setdefault(missing, []).append(run.label)
     notes = [
         f"{', '.join(labels)}: no episodes of {', '.join(missing)}; overall is the mean of the others."
@@ -197,7 +176,7 @@ def caveats(runs: Sequence[Run]) -> list[str]:
         for run in runs
         if run.failed
     ]
-    blind = [run.label for run in runs if np.isnan(run.episodes.view_distance_m).any()]
+    blind = [run.label for run in runs if np.isnan(run.episodes["view_distance_m"]).any()]
     if len(blind) < len(runs):
         notes.append("SR-view: stopped that near to any valid viewpoint of the target, with the target in sight.")
     if blind:
@@ -219,11 +198,11 @@ def sample_notes(request: ReportRequest, runs: Sequence[Run]) -> list[str]:
     """Say what the paper's protocol flies and what runs lack of it; nothing where the report is of all tasks."""
     if request.sample is None:
         return []
-    maps = sorted({scene for run in runs for scene in run.episodes.scene.tolist()})
+    maps = sorted({scene for run in runs for scene in run.episodes["scene"].tolist()})
     spread = "; ± is the sample standard deviation over these maps" if len(maps) > 1 else ""
     notes = [f"Tasks of the paper's protocol alone, on {', '.join(maps)}{spread}."]
     for run in runs:
-        settings, flown = set(run.episodes.setting.tolist()), len(run.episodes)
+        settings, flown = set(run.episodes["setting"].tolist()), len(run.episodes)
         whole = sum(len(own.get(setting, ())) for own in request.sample.tasks.values() for setting in settings)
         if flown < whole:
             notes.append(f"{run.label}: {flown:,} of the sample's {whole:,} tasks.")
@@ -232,7 +211,7 @@ def sample_notes(request: ReportRequest, runs: Sequence[Run]) -> list[str]:
 
 def in_setting(runs: Sequence[Run], setting: str) -> list[Run]:
     """Return the runs' episodes of a setting, without runs that have none."""
-    masks = [run.episodes.setting == setting for run in runs]
+    masks = [run.episodes["setting"] == setting for run in runs]
     return [run.where(mask) for run, mask in zip(runs, masks, strict=True) if mask.any()]
 
 
@@ -248,7 +227,7 @@ def result_tables(request: ReportRequest) -> list[TextTable]:
             Row(r.model, Cut(), f"another simulator (Unreal Engine; {r.source}), {r.group}-source", "paper", result=r)
             for r in results
         ]
-        rows = run_rows(replace(request, runs=runs)) + theirs
+        own = replace(request, runs=runs)
         counts = {len(run.episodes) for run in runs}
         sizes = ", ".join(f"{run.label} {len(run.episodes):,}" for run in runs)
         each = f"{counts.pop():,} episodes each." if len(counts) == 1 else f"Episodes: {sizes}."
@@ -258,10 +237,9 @@ def result_tables(request: ReportRequest) -> list[TextTable]:
                 "The paper's agents flew in its own simulator (Unreal Engine), on other scenes and tasks; its ± fits "
                 "the sample standard deviation over eight maps. Its rows are ranked among themselves."
             )
-        own = replace(request, runs=runs)
         table = make_table(
-            own, NAMES_OF[setting] + _PAPER_TABLES.get(setting, ""), rows, _by_profile(own, _FURTHER),
-            leading=("hints",), spread=True, intervals=request.intervals,
+            own, NAMES_OF[setting] + _PAPER_TABLES.get(setting, ""), run_rows(own) + theirs,
+            _by_profile(own, _FURTHER), leading=("hints",), spread=True, intervals=request.intervals,
         )  # fmt: skip
         if any(not label for label, _ in table.rows):
             notes[0] += " Below: 95 % bootstrap interval, scenes drawn anew within their family."
@@ -280,24 +258,22 @@ def radius_tables(request: ReportRequest) -> list[TextTable]:
 def breakdown_tables(request: ReportRequest, kind: str) -> list[TextTable]:
     """Make a table per breakdown of a kind that has at least two parts with episodes."""
     made = []
-    for found in request.breakdowns.found:
+    for name, found in request.breakdowns.found.items():
         if found.kind != kind or len(found.parts) < 2:
             continue
         counts = [[int((own == part).sum()) for own in found.labels] for part in found.parts]
         alike = all(len(set(count)) == 1 for count in counts)
         sizes = "; ".join(f"{part}: {n[0]:,}" for part, n in zip(found.parts, counts, strict=True))
         note = " ".join(filter(None, (found.note, f"Episodes – {sizes}." if alike else "")))
-        cuts = {part: Cut(where=((found.name, part),)) for part in found.parts}
-        cells = _cells(cuts, request.shown(_RATES))
-        made += _broken_down(request, found.title, run_rows(request), cells, notes=[note] if note else [])
+        cells = _cells({part: Cut(where=((name, part),)) for part in found.parts}, request.shown(_RATES))
+        made += _by_first_rule(request, found.title, run_rows(request), cells, notes=[note] if note else [])
     return made
 
 
-def _broken_down(
+def _by_first_rule(
     request: ReportRequest, title: str, rows: Sequence[Row], columns: Sequence[Cell], **how: Any
 ) -> list[TextTable]:
-    title = f"{title}, {profile_head(request.profiles[0])}"
-    return [make_table(request, title, rows, columns, data=request.broken_down, **how)]
+    return [make_table(request, f"{title}, {profile_head(request.profiles[0])}", rows, columns, **how)]
 
 
 def visit_tables(request: ReportRequest) -> list[TextTable]:
@@ -325,39 +301,36 @@ _CONDUCT = {
 _TABLES: dict[str, Callable[[ReportRequest], list[TextTable]]] = {
     "overall": lambda r: [make_table(
         r, "Overall", _headline_rows(r), _by_profile(r, _RATES), spread=True, leading=("episodes", "hints"),
-        notes=[_MEANS.format("four "), *sample_notes(r, r.runs), *caveats(r.runs)], data=r.broken_down,
+        notes=[_MEANS.format("four "), *sample_notes(r, r.runs), *caveats(r.runs)],
     )],
     "results": result_tables,
-    "partition": lambda r: _broken_down(
+    "partition": lambda r: _by_first_rule(
         r, "ID and OOD scenes", _setting_rows(r), _by(r, "partition", gap="OOD − ID, points"),
         notes=_adapted_notes(r.runs),
     ),
-    "family": lambda r: _broken_down(r, "By family", run_rows(r), _by(r, "family")),
-    "averages": lambda r: _broken_down(r, "Two averages", _headline_rows(r), _by_average(r), notes=[
+    "family": lambda r: _by_first_rule(r, "By family", run_rows(r), _by(r, "family")),
+    "averages": lambda r: _by_first_rule(r, "Two averages", _headline_rows(r), _cells(
+        {"mean of the families": Cut(), "mean of the tasks": Cut(weighted=True)}, r.shown()
+    ), notes=[
         "A family counts a quarter on the left, as much as it has tasks on the right: two different populations."
     ]),
-    "setting": lambda r: _broken_down(r, "By setting", run_rows(r), _by(r, "setting")),
-    "goal": lambda r: _broken_down(
+    "setting": lambda r: _by_first_rule(r, "By setting", run_rows(r), _by(r, "setting")),
+    "goal": lambda r: _by_first_rule(
         r, "Goal type", _setting_rows(r),
         _by(r, "modality", ("Semantic goal", "Image goal"), gap="image − semantic, points"),
     ),
-    "modality": lambda r: _broken_down(r, "By modality", run_rows(r), _by(r, "modality")),
+    "modality": lambda r: _by_first_rule(r, "By modality", run_rows(r), _by(r, "modality")),
     "radius": radius_tables,
     "visits": visit_tables,
     "difficulty": partial(breakdown_tables, kind=DIFFICULTY),
     "seen": partial(breakdown_tables, kind=SEEN),
     "conduct": lambda r: [tables.count_table(r, "How episodes went", run_rows(r), _CONDUCT, tables.outcome_cells)],
-    "type": lambda r: _broken_down(r, "By scene type", _type_rows(r), _by_run(r), stub="scene type"),
-    "scene": lambda r: _broken_down(r, "By scene", _scene_rows(r), _by_run(r), stub="scene"),
+    "type": lambda r: _by_first_rule(r, "By scene type", _type_rows(r), _by_run(r), stub="scene type"),
+    "scene": lambda r: _by_first_rule(r, "By scene", _scene_rows(r), _by_run(r), stub="scene"),
 }  # fmt: skip
 NAMES = tuple(_TABLES)
 # What the paper's split leaves out, and the paper's tables; the others are optional.
 DEFAULT = ("overall", "results")
-
-
-def report_tables(request: ReportRequest, names: Sequence[str] = DEFAULT) -> list[TextTable]:
-    """Make tables."""
-    return [table for made in named_tables(request, names).values() for table in made]
 
 
 def missing_note(request: ReportRequest, names: Sequence[str] = DEFAULT) -> str:
@@ -376,3 +349,8 @@ def named_tables(request: ReportRequest, names: Sequence[str]) -> dict[str, list
     """Make tables by name."""
     check_names(names)
     return {name: _TABLES[name](request) for name in NAMES if "all" in names or name in names}
+
+
+def report_tables(request: ReportRequest, names: Sequence[str] = DEFAULT) -> list[TextTable]:
+    """Make tables."""
+    return [table for made in named_tables(request, names).values() for table in made]

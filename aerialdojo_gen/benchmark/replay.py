@@ -10,6 +10,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import zip_longest
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from aerialdojo_gen.base.errors import StoreError
-from aerialdojo_gen.base.pictures import MAP_JPEG, REPLAY_JPEG, data_url, encode_jpeg
+from aerialdojo_gen.base.pictures import MAP_JPEG, REPLAY_JPEG, Picture, encode_jpeg
 from aerialdojo_gen.benchmark.agents.goal import Sensors
 from aerialdojo_gen.benchmark.episodes import read_run
 from aerialdojo_gen.benchmark.observations import render_views
@@ -84,13 +85,8 @@ def choose_tasks(runs: Sequence[Run], count: int) -> list[str]:
             ends.setdefault(task, []).append("success" if success else termination)
             families[task] = family
     ranked = sorted(ends, key=lambda task: (-len(ends[task]), -len(set(ends[task])), task))
-    queues = {family: [t for t in ranked if families[t] == family] for family in dict.fromkeys(families.values())}
-    chosen: list[str] = []
-    while len(chosen) < count and any(queues.values()):
-        for family in sorted(queues):
-            if queues[family] and len(chosen) < count:
-                chosen.append(queues[family].pop(0))
-    return chosen
+    queues = ([t for t in ranked if families[t] == family] for family in sorted(set(families.values())))
+    return [task for turn in zip_longest(*queues) for task in turn if task is not None][:count]
 
 
 def replays(
@@ -120,7 +116,8 @@ def replays(
         known = {f"{what}_{a}_m": of[f"{name}{a}_m"] for what, of, name in places for a in "xyz"}
         reference = {name: route[name] for name in ("x_m", "y_m", "z_m", "length_m")}
         corners = (float(low[0]), float(low[1])), (float(high[0]), float(high[1]))
-        yield Replay(instances[0], known, reference, *corners, data_url(encode_jpeg(seen, MAP_JPEG)), flights)
+        map_url = Picture(encode_jpeg(seen, MAP_JPEG)).data_url
+        yield Replay(instances[0], known, reference, *corners, map_url, flights)
 
 
 _scene = lru_cache(maxsize=4)(ReleasedScene)
@@ -142,7 +139,7 @@ def _flight(scene: ReleasedScene, run: Run, episode: dict[str, Any], steps: Any,
         for k in sorted({round(k) for k in np.linspace(0, max(last, 0), min(_MAX_FRAMES, last + 1))}):
             position = tuple(lists[name][k] for name in ("x_m", "y_m", "z_m"))
             views, *_ = render_views(scene.model, _FRAME, position, lists["yaw_rad"][k])
-            pictures[k] = data_url(encode_jpeg(views["front"], REPLAY_JPEG))
+            pictures[k] = Picture(encode_jpeg(views["front"], REPLAY_JPEG)).data_url
     rounded = {name: [round(v, 3) for v in values] for name, values in lists.items()}
     return Flight(run.label, _outcome(episode), **rounded, said=said, answers=answers, frames=pictures)
 

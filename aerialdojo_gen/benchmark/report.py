@@ -21,8 +21,7 @@ from aerialdojo_gen.benchmark.figures import encode_figure, family_radars, metri
 from aerialdojo_gen.benchmark.registry import in_setting, named_tables
 from aerialdojo_gen.benchmark.replay import Replay
 from aerialdojo_gen.benchmark.runs import Run
-from aerialdojo_gen.benchmark.score_rows import as_csv, as_json
-from aerialdojo_gen.benchmark.tables import ReportRequest
+from aerialdojo_gen.benchmark.tables import ReportRequest, as_csv, as_json
 from aerialdojo_gen.store.atomic import atomic_file
 
 # Long tables, folded away on the page.

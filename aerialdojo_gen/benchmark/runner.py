@@ -11,24 +11,35 @@ import hashlib
 import json
 import time
 from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from aerialdojo_gen.base.errors import StoreError, UsageError
+from aerialdojo_gen.base.errors import AerialDojoError, StoreError, UsageError
 from aerialdojo_gen.base.safe_parse import read_json
+from aerialdojo_gen.base.secrets import Secrets
 from aerialdojo_gen.benchmark import episodes
 from aerialdojo_gen.benchmark.agents import ServiceDown, agent_class, load_agent
-from aerialdojo_gen.benchmark.evaluation import BudgetTracker, Evaluation, Limits, Outcome, agent_code_digest
+from aerialdojo_gen.benchmark.episodes import Journals
+from aerialdojo_gen.benchmark.evaluation import Evaluation, Limits, Outcome, agent_code_digest
 from aerialdojo_gen.benchmark.flight import no_viewpoints_message, viewpoints_content
-from aerialdojo_gen.benchmark.journal import Journals
 from aerialdojo_gen.benchmark.tasks import goals_withheld, select
-from aerialdojo_gen.benchmark.worker import Finished, WorkUnit
-from aerialdojo_gen.benchmark.workers import fly_units
-from aerialdojo_gen.pipeline.executors.base import SharedPaths, make_executor, on_disk
+from aerialdojo_gen.benchmark.worker import Finished, Worker, WorkUnit
+from aerialdojo_gen.dataset.contents import release_fingerprint
+from aerialdojo_gen.pipeline.executors.base import (
+    Executor,
+    ParentChannel,
+    SharedPaths,
+    WorkerChannel,
+    at_end,
+    make_executor,
+    on_disk,
+)
 from aerialdojo_gen.pipeline.interrupt import Interrupts
 from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.store import shards as store
@@ -50,12 +61,10 @@ def evaluate(
     limits = limits or Limits()
     root, log = open_root(data), open_root(data if out is None else out)
     reporter = reporter or Reporter(quiet=True)
-    folder = log.below(f"runs/{check_run_name(evaluation.run)}")
-    rows = select(root, evaluation.selection)
-    run = RunLog(root, log, folder, evaluation, rows)
+    run = RunLog(root, log, evaluation)
     paths = SharedPaths(on_disk(root, below="release"), (), (run.journals.folder,), reporter.line)
     made = make_executor(executor, workers, address, paths)
-    with folder.lock(), Interrupts() as interrupts:
+    with run.folder.lock(), Interrupts() as interrupts:
         if restart:
             run.drop()
         run.check_settings()
@@ -64,18 +73,19 @@ def evaluate(
         if todo.num_rows:
             evaluation = preflight(evaluation, limits, reporter)
             if run.no_viewpoints_message and run.goals_known:
-                reporter.line(no_viewpoints_message(run.no_viewpoints_message, len(rows["scene"].unique())))
-        budget = BudgetTracker(limits, *run.spent())
+                reporter.line(no_viewpoints_message(run.no_viewpoints_message, len(run.rows["scene"].unique())))
+        total = run.spent()
         with reporter.bar(evaluation.label, todo.num_rows, "episodes") as bar:
 
             def on_finished(finished: Finished) -> None:
-                budget.total += finished
+                nonlocal total
+                total += finished
                 bar.advance(finished.episodes)
 
             def stopped() -> bool:
                 interrupts.check()
                 run.checkpoint(reporter)
-                return bool(budget.spent or budget.failing)
+                return bool(limits.reached(total) or limits.failing(total))
 
             try:
                 # The processes have ended when their journals are flushed.
@@ -87,31 +97,29 @@ def evaluate(
                         run.flush_journals(scene)
             except ServiceDown as error:
                 raise ServiceDown(f"{error} Finished episodes are kept: the same command continues") from None
-        if budget.spent and len(run.todo(False)):
-            reporter.line(f"stopped at {budget.spent}: the same command with a higher limit continues")
+        if (limit := limits.reached(total)) and len(run.todo(False)):
+            reporter.line(f"stopped at {limit}: the same command with a higher limit continues")
         finished, failed, successes = run.counts()
     why = ""
-    if budget.failing is not None:
-        why = f"stopped after {limits.failures_in_row} failures in a row of one kind ({budget.failing.kind})."
-    now, seconds = budget.total, time.monotonic() - started
+    if kind := limits.failing(total):
+        why = f"stopped after {limits.failures_in_row} failures in a row of one kind ({kind})."
     return Outcome(
-        rows.num_rows, finished, failed, now.episodes, now.actions, now.cost_usd, now.tokens, seconds, why,
-        run.failures(), now.flown, successes if run.goals_known else None,
+        run.rows.num_rows, finished, failed, total.episodes, total.actions, total.cost_usd, total.tokens,
+        time.monotonic() - started, why, run.failures(), total.flown, successes if run.goals_known else None,
     )  # fmt: skip
 
 
 class RunLog:
     """A run's folder and tables: what is in them, and what is left to fly."""
 
-    def __init__(
-        self, data: DataRoot, out: DataRoot, folder: DataRoot, evaluation: Evaluation, rows: pa.Table
-    ) -> None:
-        self._out, self._folder, self._name = out, folder, evaluation.run
+    def __init__(self, data: DataRoot, out: DataRoot, evaluation: Evaluation) -> None:
+        self._out, self._name = out, evaluation.run
+        self.folder = out.below(f"runs/{check_run_name(evaluation.run)}")
+        self.rows = select(data, evaluation.selection)
         self.journals = Journals(out, evaluation.run)
         self._uncommitted = ""
-        self._rows = rows
-        self._scenes: list[str] = rows["scene"].unique().to_pylist()
-        subsets = rows["subset"].unique().to_pylist()
+        self._scenes: list[str] = self.rows["scene"].unique().to_pylist()
+        subsets = self.rows["subset"].unique().to_pylist()
         content = {
             f"{table}/{scene}": store.content(data, table, scene)
             for scene in self._scenes
@@ -132,10 +140,10 @@ class RunLog:
         begun = episodes.run_scenes(self._out, self._name) or self.journals
         advice = "give another --run, or --restart"
         # A run without finished episodes may change: an agent's options may have been wrong.
-        if begun and self._folder.exists(_SETTINGS):
-            before, own = read_json(self._folder.local_copy(_SETTINGS), UsageError), ("data", "code")
+        if begun and self.folder.exists(_SETTINGS):
+            before, own = read_json(self.folder.local_copy(_SETTINGS), UsageError), ("data", "code")
             if not isinstance(before, dict):
-                raise UsageError(f"{self._folder.at(_SETTINGS)} holds no settings of a run: {advice}")
+                raise UsageError(f"{self.folder.at(_SETTINGS)} holds no settings of a run: {advice}")
             for key, value in self._settings.items():
                 if before.get(key) != value:
                     what = f"{key} = {before.get(key)!r}, not {value!r}"
@@ -145,22 +153,20 @@ class RunLog:
             written = store.shards(self._out, "episodes", scene, self._name)[0]
             if store.read_info(self._out, written).fingerprint != self._fingerprint:
                 raise UsageError(f"there are episodes of another run {self._name!r} in {self._out}: {advice}")
-        with self._folder.commit(_SETTINGS) as temporary:
+        with self.folder.commit(_SETTINGS) as temporary:
             temporary.write_text(json.dumps(self._settings, indent=2, sort_keys=True) + "\n", encoding="utf-8")
 
     def drop(self) -> None:
         """Remove the run."""
         episodes.remove_run(self._out, self._name)
         self.journals.drop()
-        self._folder.delete(_SETTINGS)
+        self.folder.delete(_SETTINGS)
 
     def flush_journals(self, scene: str = "*") -> None:
         """Move the journals of a scene, or of all, into the tables."""
-        for name in self.journals.scenes(scene):
-            records = self.journals.records(name)
+        for name, records in self.journals.take(scene):
             if records:
                 episodes.add_records(self._out, self._name, name, records, self._fingerprint)
-            self.journals.remove(name)
 
     def checkpoint(self, reporter: Reporter) -> None:
         """Commit finished episodes to an object store from time to time; report an unreachable store once."""
@@ -174,11 +180,11 @@ class RunLog:
 
     def todo(self, rerun_failed: bool) -> pa.Table:
         """Rows still to be flown, or exactly those that failed."""
-        ids = self._rows["task_id"]
+        ids = self.rows["task_id"]
         if rerun_failed:
-            return self._rows.filter(pc.is_in(ids, pa.array(self._ids("failures"), pa.string())))
+            return self.rows.filter(pc.is_in(ids, pa.array(self._ids("failures"), pa.string())))
         done = self._ids("episodes") + self._ids("failures")
-        return self._rows.filter(pc.invert(pc.is_in(ids, pa.array(done, pa.string()))))
+        return self.rows.filter(pc.invert(pc.is_in(ids, pa.array(done, pa.string()))))
 
     def counts(self) -> tuple[int, int, int]:
         """Episodes in the tables: finished, failed, successful."""
@@ -194,12 +200,12 @@ class RunLog:
         counted = Counter(row["kind"] for row in rows).most_common()
         return tuple(f"{n} × {kind}{'' if i else f' ({first[kind]})'}" for i, (kind, n) in enumerate(counted))
 
-    def spent(self) -> tuple[float, int]:
+    def spent(self) -> Finished:
         """US dollars and tokens spent so far."""
         columns = ("cost_usd", "input_tokens", "output_tokens")
         rows = self._read("episodes", *columns) + self._read("failures", *columns)
         tokens = sum((row["input_tokens"] or 0) + (row["output_tokens"] or 0) for row in rows)
-        return sum(row["cost_usd"] or 0.0 for row in rows), tokens
+        return Finished(cost_usd=sum(row["cost_usd"] or 0.0 for row in rows), tokens=tokens)
 
     def _read(self, table: str, *columns: str) -> list[dict[str, Any]]:
         """Read columns of a table of the run, all scenes that are written."""
@@ -246,3 +252,65 @@ def preflight(evaluation: Evaluation, limits: Limits, reporter: Reporter) -> Eva
     finally:
         agent.close()
     return replace(evaluation, options={**evaluation.options, **settled}, used=used)
+
+
+# Assumed memory per process, megabytes, without an agent's model.
+MEMORY_MB = 1000
+
+
+def fly_units(
+    data: DataRoot, evaluation: Evaluation, units: Sequence[WorkUnit], executor: Executor,
+    on_finished: Callable[[Finished], None], stopped: Callable[[], bool],
+) -> Iterator[str]:  # fmt: skip
+    """Fly units, and yield a scene when all of its units are finished."""
+    left = Counter(unit.scene for unit in units)
+    fly, channel = partial(_fly, data, evaluation), ParentChannel(on_finished, stopped)
+    for outcome in executor.map(fly, units, lambda unit: unit.scene, channel=channel, memory_mb=MEMORY_MB):
+        if isinstance(outcome, AerialDojoError):
+            raise outcome
+        left[outcome] -= 1
+        if not left[outcome]:
+            yield outcome
+
+
+# This process's worker, made at its first unit: an agent may hold a model, and the flight holds scenes.
+_worker_of_process: dict[str, Worker] = {}
+
+
+def _make_worker(data: DataRoot, evaluation: Evaluation, link: WorkerChannel) -> Worker:
+    """Make a worker with its agent, which is closed when the process has done its work."""
+    agent: Any = load_agent(evaluation.agent, **evaluation.options)
+    if evaluation.requests_per_minute is not None:
+        if not hasattr(agent, "pace"):
+            raise UsageError(f"agent {evaluation.agent!r} has no attribute pace: leave --requests-per-minute out")
+        # Requests of all workers are spaced evenly.
+        interval_s = 60.0 / evaluation.requests_per_minute
+        agent.pace = lambda: time.sleep(link.turn(interval_s))
+    if hasattr(agent, "suits"):
+        agent.suits(release_fingerprint(data))
+    flight = evaluation.flight_of(agent, data)
+    at_end(_worker_of_process.clear)
+    if hasattr(agent, "close"):
+        at_end(agent.close)
+    secrets = Secrets(evaluation.options)
+    return Worker(agent, flight, data, evaluation.identity(), evaluation.retry_policy, secrets)
+
+
+def _fly(data: DataRoot, evaluation: Evaluation, unit: WorkUnit, link: WorkerChannel) -> str:
+    if "worker" not in _worker_of_process:
+        _worker_of_process["worker"] = _make_worker(data, evaluation, link)
+    unsent, last = Finished(), time.monotonic()
+
+    def add(finished: Finished) -> None:
+        nonlocal unsent, last
+        unsent += finished
+        if time.monotonic() - last >= link.every_s:
+            link.send(unsent)
+            unsent, last = Finished(), time.monotonic()
+
+    try:
+        _worker_of_process["worker"].fly(unit, add, link.stopped)
+    finally:
+        if unsent.episodes:
+            link.send(unsent)
+    return unit.scene

@@ -73,7 +73,6 @@ class Run:
     agent: str  # The agent, and its options as JSON
     options: str
     table: pa.Table  # The log, all columns
-    episodes: Episodes  # The columns that metrics use
     failed: int = 0  # Episodes that failed for external reasons, not in the table
     log: DataRoot | None = None  # The root that `evaluate` wrote to, where its steps are
     group: str = ""  # Heading of its section in tables; empty for none
@@ -82,7 +81,12 @@ class Run:
     def where(self, mask: Bools | NDArray[np.int64]) -> Run:
         """Return the run with the episodes that a mask selects, or with those at some indices in their order."""
         chosen = np.flatnonzero(mask) if mask.dtype == np.bool_ else mask
-        return replace(self, table=self.table.take(pa.array(chosen)), episodes=self.episodes.where(chosen))
+        return replace(self, table=self.table.take(pa.array(chosen)))
+
+    @cached_property
+    def episodes(self) -> Episodes:
+        """The columns that metrics use; StoreError where the log contradicts itself or has no goals."""
+        return episodes_of(self.table)
 
     @cached_property
     def path_clearance_to_goal_m(self) -> Floats | None:
@@ -100,41 +104,39 @@ def load_runs(data: Where, names: Sequence[str] = (), sample: Sample | None = No
         rows = read_run(root, name, table)
         return rows if sample is None else rows.filter(pc.is_in(rows["task_id"], pa.array(sample.ids(), pa.string())))
 
-    tables = {name: read(name) for name in (names or run_names(root))}
-    if not names:
-        tables = {name: table for name, table in tables.items() if table.num_rows}
-    if not tables:
-        what = "no runs" if sample is None else "no episodes of the paper's sample"
-        raise StoreError(f"{what} in {root}: run {command('evaluate', protocol=sample and 'paper')}")
-    for name, table in tables.items():
+    loaded, of = [], "" if sample is None else " of the paper's sample"
+    for name in dict.fromkeys(names or run_names(root)):
+        table = read(name)
+        if not table.num_rows and not names:
+            continue
+        failed = read(name, "failures").num_rows
         if not table.num_rows:
-            failed = read(name, "failures").num_rows
             said = f", and {failed:,} that failed: fly them again with" if failed else ": run"
             rerun_command = command("evaluate", run=name, protocol=sample and "paper", rerun_failed=bool(failed))
-            of = "" if sample is None else " of the paper's sample"
             raise StoreError(f"run {name!r} has no finished episode{of}{said} {rerun_command}")
-    loaded = []
-    for name, table in tables.items():
-        agent, options, told = (table[column][0].as_py() for column in ("agent", "agent_options", "told"))
+        agent, options, hints = (table[column][0].as_py() for column in ("agent", "agent_options", "told"))
         # With hints it is another contender.
-        label = f"{agent} + {told}" if told else agent
-        episodes, failed = mark_adapted(episodes_of(table), options), read(name, "failures").num_rows
-        loaded.append(Run(name, label, agent, options, table, episodes, failed, root, hints=told or ""))
+        label = f"{agent} + {hints}" if hints else agent
+        loaded.append(Run(name, label, agent, options, mark_adapted(table, options), failed, root, hints=hints or ""))
+    if not loaded:
+        what = "no runs" if sample is None else f"no episodes{of}"
+        raise StoreError(f"{what} in {root}: run {command('evaluate', protocol=sample and 'paper')}")
     labels = Counter(run.label for run in loaded)
     return [replace(run, label=f"{run.label} ({run.name})") if labels[run.label] > 1 else run for run in loaded]
 
 
-def mark_adapted(episodes: Episodes, options: str) -> Episodes:
-    """Tell OOD scenes that the agent was trained on, by `trained_on` of its logged options, from other OOD scenes."""
+def mark_adapted(table: pa.Table, options: str) -> pa.Table:
+    """Mark the OOD scenes that the agent was trained on, by `trained_on` of its logged options, in `partition`."""
     try:
         given = loads_json(options)
     except Malformed:
-        return episodes
+        return table
     scenes = given.get("trained_on") if isinstance(given, dict) else None
     if not isinstance(scenes, list):
-        return episodes
-    known = np.isin(episodes.scene, [scene for scene in scenes if isinstance(scene, str)])
-    return replace(episodes, partition=np.where((episodes.partition == "OOD") & known, ADAPTED, episodes.partition))
+        return table
+    trained = pc.is_in(table["scene"], pa.array([scene for scene in scenes if isinstance(scene, str)], pa.string()))
+    marked = pc.if_else(pc.and_(pc.equal(table["partition"], "OOD"), trained), ADAPTED, table["partition"])
+    return table.set_column(table.column_names.index("partition"), "partition", marked)
 
 
 _BASELINE_AGENTS = tuple(agent for agent, group in GROUP_OF.items() if group == BASELINES)
@@ -142,28 +144,21 @@ _BASELINE_AGENTS = tuple(agent for agent, group in GROUP_OF.items() if group == 
 
 def with_baselines(log: DataRoot, runs: Sequence[Run]) -> list[Run]:
     """Add baseline runs that flew the same tasks and are not among the runs."""
-    there = {run.agent for run in runs}
-    wanted = {task for run in runs for task in run.table["task_id"].to_pylist()}
+    wanted = pa.array({task for run in runs for task in run.table["task_id"].to_pylist()}, pa.string())
     added: dict[str, Run] = {}
     for name in run_names(log):
-        if name in {run.name for run in runs}:
+        try:
+            agents = read_run(log, name, columns=["agent"])["agent"]
+        except StoreError:
+            # Not requested: a damaged run is skipped.
             continue
-        (run,) = load_runs(log, [name]) if _is_baseline(log, name) else (None,)
-        if run is None or run.agent in there or run.agent in added:
-            continue
-        mask = np.array([task in wanted for task in run.table["task_id"].to_pylist()], dtype=np.bool_)
-        if mask.sum() == len(wanted):
-            added[run.agent] = run.where(mask)
+        agent = agents[0].as_py() if len(agents) else ""
+        if agent in {*_BASELINE_AGENTS} - {run.agent for run in runs} - {*added}:
+            (run,) = load_runs(log, [name])
+            mask = pc.is_in(run.table["task_id"], wanted).to_numpy()
+            if mask.sum() == len(wanted):
+                added[agent] = run.where(mask)
     return [*runs, *(added[agent] for agent in _BASELINE_AGENTS if agent in added)]
-
-
-def _is_baseline(log: DataRoot, name: str) -> bool:
-    try:
-        agents = read_run(log, name, columns=["agent"])["agent"]
-    except StoreError:
-        # Not requested: a damaged run is skipped.
-        return False
-    return len(agents) > 0 and agents[0].as_py() in _BASELINE_AGENTS
 
 
 def group_runs(runs: Sequence[Run], groups: Mapping[str, Sequence[str]] | None = None) -> list[Run]:

@@ -25,8 +25,7 @@ from aerialdojo_gen.base.safe_parse import read_json
 from aerialdojo_gen.base.version import __version__
 from aerialdojo_gen.benchmark.agents.goal import BLIND
 from aerialdojo_gen.benchmark.evaluation import Evaluation
-from aerialdojo_gen.benchmark.intervals import score_intervals
-from aerialdojo_gen.benchmark.metrics import DEFAULT_PROFILES, METRICS, PROFILES, episodes_of, summarize
+from aerialdojo_gen.benchmark.metrics import DEFAULT_PROFILES, METRICS, PROFILES, bootstrap, episodes_of, summarize
 from aerialdojo_gen.benchmark.runner import evaluate
 from aerialdojo_gen.benchmark.runs import ADAPTED, mark_adapted
 from aerialdojo_gen.benchmark.submission import (
@@ -132,10 +131,10 @@ def score(
         evaluate(root, replay, out=temporary, workers=workers, reporter=reporter)
         found = logged(open_root(temporary), name)
         _check_replay(file, submission, found)
-        marked = mark_adapted(episodes_of(found.table), submission.run.agent_options)
+        marked = mark_adapted(found.table, submission.run.agent_options)
         card = ScoreCard(
             name=name, agent=submission.run.agent, told=submission.run.told,
-            adapted=adapted or bool((marked.partition == ADAPTED).any()),
+            adapted=adapted or ADAPTED in marked["partition"].to_pylist(),
             scored=f"{datetime.datetime.now(datetime.UTC):%Y-%m-%d}, by {__version__}",
             code=submission.run.code, tasks=tasks, rows=list(_score_rows(found.table)),
         )  # fmt: skip
@@ -211,12 +210,13 @@ def _check_replay(file: Path, submission: Submission, found: Logged) -> None:
     if faults:
         raise SubmissionRefused(f"{file} is refused: {len(faults):,} of {len(place):,} episodes do not replay; "
                                 f"{faults[0]}")  # fmt: skip
-    for metric, is_so in (found.metrics or {}).items():
+    for metric, measured in (found.metrics or {}).items():
         if submission.metrics is None:
             return
-        said = submission.metrics.get(metric)
-        if (said is None) != (is_so is None) or (said is not None and abs(said - (is_so or 0.0)) > _TOLERANCE):
-            shown = [text(metric, math.nan if value is None else value) for value in (said, is_so)]
+        claimed = submission.metrics.get(metric)
+        off = abs((claimed or 0.0) - (measured or 0.0))
+        if (claimed is None) != (measured is None) or off > _TOLERANCE:
+            shown = [text(metric, math.nan if value is None else value) for value in (claimed, measured)]
             raise SubmissionRefused(
                 f"{file} is refused: it claims {metric} = {shown[0]}, and its actions give {shown[1]}"
             )
@@ -224,18 +224,18 @@ def _check_replay(file: Path, submission: Submission, found: Logged) -> None:
 
 def _fault(theirs: Flown, i: int, own: Flown, k: int) -> str:
     """Say what of an episode does not come out; empty where all does."""
-    said, done = len(theirs.actions[i]), len(own.actions[k])
-    if done > said:
-        return f"its {said} actions do not end it"
-    if done < said:
-        return f"it ends by {own.termination[k]} after {done} of its {said} actions"
+    claimed, flown = len(theirs.actions[i]), len(own.actions[k])
+    if flown > claimed:
+        return f"its {claimed} actions do not end it"
+    if flown < claimed:
+        return f"it ends by {own.termination[k]} after {flown} of its {claimed} actions"
     if theirs.termination[i] != own.termination[k]:
         return f"it ends by {own.termination[k]}, not by {theirs.termination[i]}"
     for name in ("x_m", "y_m", "z_m", "yaw_rad", "path_length_m"):
         claim, value = getattr(theirs, name)[i], getattr(own, name)[k]
-        apart = abs(claim - value)
+        off = abs(claim - value)
         # Half a turn has two names.
-        if min(apart, abs(math.tau - apart)) > _TOLERANCE if name == "yaw_rad" else apart > _TOLERANCE:
+        if min(off, abs(math.tau - off)) > _TOLERANCE if name == "yaw_rad" else off > _TOLERANCE:
             return f"it ends with {name} = {value:.3f}, not {claim:.3f}"
     return ""
 
@@ -245,13 +245,13 @@ def _score_rows(table: pa.Table) -> Iterator[ScoreRow]:
     episodes = episodes_of(table)
     for setting in ("all", *SETTINGS):
         for partition in ("all", "ID", "OOD"):
-            chosen = (episodes.setting == setting) | (setting == "all")
-            chosen &= (episodes.partition == partition) | (partition == "all")
+            chosen = (episodes["setting"] == setting) | (setting == "all")
+            chosen &= (episodes["partition"] == partition) | (partition == "all")
             if not chosen.any():
                 continue
             for profile in map(PROFILES.__getitem__, DEFAULT_PROFILES):
-                summary = summarize(episodes.where(chosen), profile)
-                low, high = zip(*score_intervals(summary), strict=True)
+                summary = summarize(episodes[chosen], profile)
+                low, high = bootstrap(summary.scene_scores()).tolist()
                 yield ScoreRow(
                     setting=setting, partition=partition, radius_m=profile.radius_m, episodes=int(chosen.sum()),
                     mean=_known(summary.overall[1:]), low=_known(low), high=_known(high),

@@ -1,22 +1,27 @@
 """The tables of scores: what a report is asked for, and one engine that fills a table from the outcomes.
 
-Rates are per cent, distances metres; ± is the standard deviation over scenes.
+Rates are per cent, distances metres; ± is the standard deviation over scenes. CSV and JSON have every score as one
+row of a tidy table, fractions and metres.
 """
 
 from __future__ import annotations
 
+import csv
+import io
+import json
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from functools import cache, cached_property
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from aerialdojo_gen.base.cached import cached_method
+from aerialdojo_gen.base.constants import MODALITIES
 from aerialdojo_gen.base.paper_figures import PaperResult
 from aerialdojo_gen.base.text_table import BEST, SECOND, Column, TextTable
 from aerialdojo_gen.benchmark.difficulty import Breakdowns, find_breakdowns
-from aerialdojo_gen.benchmark.intervals import score_intervals
 from aerialdojo_gen.benchmark.metrics import (
     MEASURES,
     METRICS,
@@ -25,16 +30,16 @@ from aerialdojo_gen.benchmark.metrics import (
     Profile,
     Score,
     Summary,
+    bootstrap,
     knows_views,
     outcomes,
     score,
     summarize_values,
-    values_of,
 )
 from aerialdojo_gen.benchmark.runs import Run
 from aerialdojo_gen.dataset.protocol import Sample
 from aerialdojo_gen.store.root import DataRoot
-from aerialdojo_gen.store.schemas import TERMINATIONS
+from aerialdojo_gen.store.schemas import SETTINGS, TERMINATIONS
 
 GROUPS = ("scene", "family", "scene_type", "partition", "setting", "modality")
 # They have 29 % of the paper's tasks.
@@ -62,67 +67,17 @@ class Cut:
         )
 
 
-class OutcomeTable:
-    """Episodes of some runs, their groups as columns; judged by a profile when it is first needed."""
-
-    def __init__(self, runs: Sequence[Run], labels: Mapping[str, Sequence[Any]] | None = None) -> None:
-        self.runs = runs
-        columns: dict[str, Any] = {
-            name: np.concatenate([getattr(run.episodes, name) for run in runs]) for name in GROUPS
-        }
-        columns["malls"] = np.where(np.isin(columns["scene"], MALLS), "malls", "other scenes")
-        columns["run"] = np.repeat(np.arange(len(runs)), [len(run.episodes) for run in runs])
-        self.columns = columns | {name: np.concatenate(parts) for name, parts in (labels or {}).items()}
-        self.judged, self.summary = cache(self._judged), cache(self._summary)
-        # The 95 % intervals of a cut's overall metrics, in the order of `METRICS`.
-        self.intervals = cache(lambda cut: score_intervals(self.summary(cut)))
-
-    def _judged(self, profile: Profile, along_way: bool = False) -> Floats:
-        """Return the `METRICS` of every episode, (n, 6), by a profile."""
-        logs = [run.episodes for run in self.runs]
-        if along_way:
-            nearest = [run.path_clearance_to_goal_m for run in self.runs]
-            logs = [replace(log, min_distance_m=m) for log, m in zip(logs, nearest, strict=True) if m is not None]
-        return np.concatenate([values_of(outcomes(log, profile)) for log in logs])
-
-    def mask(self, cut: Cut) -> Bools:
-        """Select the episodes of a cut."""
-        mask = np.ones(len(self.columns["run"]), np.bool_)
-        for name, value in (*cut.where, *([] if cut.run is None else [("run", cut.run)])):
-            mask &= self.columns[name] == value
-        return mask
-
-    def values(self, name: str, cut: Cut, order: Sequence[str] | None = None) -> list[str]:
-        """List the values of a column that a cut has, in an order."""
-        there = set(self.columns[name][self.mask(cut)].tolist()) - {""}
-        return sorted(there) if order is None else [value for value in order if value in there]
-
-    def _summary(self, cut: Cut) -> Summary:
-        """Average a cut by scene, family and overall."""
-        mask = self.mask(cut)
-        assert cut.profile is not None
-        scene, family = (self.columns[name][mask] for name in ("scene", "family"))
-        return summarize_values(self.judged(cut.profile, cut.along_way)[mask], scene, family)
-
-    def score(self, cut: Cut) -> Score:
-        """Average a cut to one score."""
-        if not cut.weighted:
-            return self.summary(cut).overall
-        assert cut.profile is not None
-        return score(self.judged(cut.profile, cut.along_way)[self.mask(cut)])
-
-
 NONE = "–"
 DEFAULT_RADII_M = (3.0, 5.0)
 
 
 @dataclass(frozen=True)
 class ReportRequest:
-    """Runs, success rules and options of a report."""
+    """Runs, success rules and options of a report; all episodes, judged by a rule when it is first needed."""
 
     data: DataRoot  # Root of the release that the tasks are from; runs may be elsewhere
     runs: Sequence[Run]  # In the order and groups of the rows
-    profiles: Sequence[Profile]  # Success rules; tables of a single rule use the first
+    profiles: Sequence[Profile]  # Success rules; a cut without one is judged by the first
     radii_m: Sequence[float] = DEFAULT_RADII_M  # Of the table of radii, metres
     intervals: bool = True  # Whether 95 % intervals are shown
     paper_results: Sequence[PaperResult] = ()  # Results of the paper to show beside the runs'
@@ -133,15 +88,56 @@ class ReportRequest:
         """Breakdowns of the episodes by difficulty and by what training shows."""
         return find_breakdowns(self.data, self.runs)
 
-    @cached_property
-    def table(self) -> OutcomeTable:
-        """All episodes."""
-        return OutcomeTable(self.runs)
+    @cached_method
+    def column(self, name: str) -> Any:
+        """Return a group of every episode, (n,): of the log's columns, ``malls``, ``run``, or a breakdown's parts."""
+        if name == "run":
+            return np.repeat(np.arange(len(self.runs)), [len(run.episodes) for run in self.runs])
+        if name == "malls":
+            return np.where(np.isin(self.column("scene"), MALLS), "malls", "other scenes")
+        if name in GROUPS:
+            return np.concatenate([run.episodes[name] for run in self.runs])
+        return np.concatenate(self.breakdowns.found[name].labels)
 
-    @cached_property
-    def broken_down(self) -> OutcomeTable:
-        """All episodes, with the breakdowns as columns."""
-        return OutcomeTable(self.runs, {found.name: found.labels for found in self.breakdowns.found})
+    @cached_method
+    def _judged(self, profile: Profile | None, along_way: bool) -> Floats:
+        """Return the `METRICS` of every episode, (n, 6), by a profile."""
+        return np.concatenate([
+            np.column_stack(outcomes(
+                run.episodes, profile or self.profiles[0], run.path_clearance_to_goal_m if along_way else None
+            ))
+            for run in self.runs
+        ])  # fmt: skip
+
+    def mask(self, cut: Cut) -> Bools:
+        """Select the episodes of a cut."""
+        mask = np.ones(len(self.column("run")), np.bool_)
+        for name, value in (*cut.where, *([] if cut.run is None else [("run", cut.run)])):
+            mask &= self.column(name) == value
+        return mask
+
+    def values(self, name: str, cut: Cut, order: Sequence[str] | None = None) -> list[str]:
+        """List the values of a column that a cut has, in an order."""
+        there = set(self.column(name)[self.mask(cut)].tolist()) - {""}
+        return sorted(there) if order is None else [value for value in order if value in there]
+
+    @cached_method
+    def summary(self, cut: Cut) -> Summary:
+        """Average a cut by scene, family and overall."""
+        mask = self.mask(cut)
+        values = self._judged(cut.profile, cut.along_way)[mask]
+        return summarize_values(values, self.column("scene")[mask], self.column("family")[mask])
+
+    def score(self, cut: Cut) -> Score:
+        """Average a cut to one score."""
+        if cut.weighted:
+            return score(self._judged(cut.profile, cut.along_way)[self.mask(cut)])
+        return self.summary(cut).overall
+
+    @cached_method
+    def interval(self, cut: Cut) -> Floats:
+        """Return the 95 % intervals of a cut's overall `METRICS`, (2, 6)."""
+        return bootstrap(self.summary(cut).scene_scores())
 
     def shown(self, metrics: Sequence[str] = METRICS, profile: Profile | None = None) -> list[str]:
         """Choose measures: SR-view only where any run logs it."""
@@ -190,13 +186,11 @@ def text(measure: str, value: float, signed: bool = False) -> str:
 def make_table(
     request: ReportRequest, title: str, rows: Sequence[Row], columns: Sequence[Cell], *, stub: str = "agent",
     notes: Sequence[str] = (), leading: Sequence[str] = (), spread: bool = False, intervals: bool = False,
-    data: OutcomeTable | None = None,
 ) -> TextTable:  # fmt: skip
     """Evaluate a table: every cell is a measure of its row's and its column's episodes.
 
     `leading` are headings of columns that are no measures; `spread` shows deviations over scenes.
     """
-    data, base = data or request.table, Cut(profile=request.profiles[0])
     lines: list[tuple[str, tuple[str, ...]]] = []
     sections: dict[int, str] = {}
     ranked: list[dict[str, list[tuple[float, int]]]] = [{} for _ in columns]
@@ -206,7 +200,7 @@ def make_table(
             sections[len(lines)] = above = row.section
         cells = []
         for column, group in zip(columns, ranked, strict=True):
-            value, off = _value(data, base, row, column, spread)
+            value, off = _value(request, row, column, spread)
             deviation = "" if math.isnan(off) else f" ± {text(column.measure, off)}"
             cells.append(text(column.measure, value, signed=column.minus is not None) + deviation)
             if row.rank_group is not None and column.minus is None and not math.isnan(value):
@@ -214,8 +208,8 @@ def make_table(
                 group.setdefault(row.rank_group, []).append((figure, len(lines)))
         lines.append((row.label, (*(row.leading.get(head, NONE) for head in leading), *cells)))
         if intervals and row.result is None:
-            gap = ("",) * len(leading)
-            lines += [(label, gap + ends) for label, ends in _interval_line(data, base | row.cut, columns)]
+            ends = [_interval(request, row.cut | column.cut, column.measure) for column in columns]
+            lines += [("", ("",) * len(leading) + (*ends,))] if {*ends} != {NONE} else []
     shift = len(leading)
     marks = {(i, shift + k): mark for k, groups in enumerate(ranked) for i, mark in _marks(groups).items()}
     heads = [Column(head) for head in leading]
@@ -223,26 +217,23 @@ def make_table(
     return TextTable(stub, heads, lines, title, notes, sections, marks)
 
 
-def _value(data: OutcomeTable, base: Cut, row: Row, column: Cell, spread: bool) -> tuple[float, float]:
+def _value(request: ReportRequest, row: Row, column: Cell, spread: bool) -> tuple[float, float]:
     """Return the value of a cell and its deviation over scenes; NaN for unknown."""
-    cut = base | row.cut | column.cut
+    cut = row.cut | column.cut
     if row.result is not None:
+        profile = cut.profile or request.profiles[0]
         # Another rule at the same radius is another measure.
-        key = (column.measure, cut.profile.radius_m) if cut.profile and cut.profile.own else ("", 0.0)
+        key = (column.measure, profile.radius_m) if profile.own else ("", 0.0)
         return row.result.mean.get(key, math.nan), row.result.spread.get(key, math.nan)
-    value: float = getattr(data.score(cut), column.measure)
+    value: float = getattr(request.score(cut), column.measure)
     if column.minus is not None:
-        value -= getattr(data.score(base | row.cut | column.minus[1]), column.minus[0])
-    return value, getattr(data.summary(cut).deviation, column.measure) if spread else math.nan
+        value -= getattr(request.score(row.cut | column.minus[1]), column.minus[0])
+    return value, getattr(request.summary(cut).deviation, column.measure) if spread else math.nan
 
 
-def _interval_line(data: OutcomeTable, cut: Cut, columns: Sequence[Cell]) -> list[tuple[str, tuple[str, ...]]]:
-    """Write the row of intervals below a row; none where no interval is known."""
-    shown = []
-    for column in columns:
-        low, high = data.intervals(cut | column.cut)[METRICS.index(column.measure)]
-        shown.append(NONE if math.isnan(low) else f"{text(column.measure, low)}–{text(column.measure, high)}")
-    return [("", tuple(shown))] if set(shown) != {NONE} else []
+def _interval(request: ReportRequest, cut: Cut, measure: str) -> str:
+    low, high = request.interval(cut)[:, METRICS.index(measure)].tolist()
+    return NONE if math.isnan(low) else f"{text(measure, low)}–{text(measure, high)}"
 
 
 def _marks(groups: Mapping[str, Sequence[tuple[float, int]]]) -> dict[int, str]:
@@ -267,7 +258,7 @@ def count_table(
         assert row.cut.run is not None
         run = request.runs[row.cut.run]
         for name, value in row.cut.where:
-            run = run.where(getattr(run.episodes, name) == value)
+            run = run.where(run.episodes[name] == value)
         lines.append((row.label, cells(run, profile)))
     sections = {k: row.section for k, row in enumerate(rows) if row.section != (rows[k - 1].section if k else "")}
     heads = [Column(head, group) for group, names in groups.items() for head in names]
@@ -278,13 +269,13 @@ def visit_cells(run: Run, profile: Profile) -> tuple[str, ...]:
     """Count episodes that were within the radius and are no success, by how they ended."""
     e = run.episodes
     judged = outcomes(e, profile)
-    lost = judged.oracle_success & ~judged.success
-    within = judged.distance_m <= profile.radius_m
-    stopped = e.stop_called & ~e.collision & (e.n_actions <= e.action_budget)
-    unstopped = ~stopped & ~e.collision
+    lost = judged.osr & ~judged.sr
+    within = judged.dts_m <= profile.radius_m
+    stopped = e["stop_called"] & ~e["collision"] & (e["n_actions"] <= e["action_budget"])
+    unstopped = ~stopped & ~e["collision"]
     n = int(lost.sum())
-    counts = (len(e), int(judged.oracle_success.sum()), int(judged.success.sum()), n)
-    ends = (stopped, e.collision, unstopped & ~within, unstopped & within)
+    counts = (len(e), int(judged.osr.sum()), int(judged.sr.sum()), n)
+    ends = (stopped, e["collision"], unstopped & ~within, unstopped & within)
     shares = (f"{100.0 * int((lost & end).sum()) / n:.1f}" if n else NONE for end in ends)
     return (*(f"{count:,}" for count in counts), *shares)
 
@@ -293,12 +284,73 @@ def outcome_cells(run: Run, _: Profile) -> tuple[str, ...]:
     """Say how episodes ended, and what a language-model service used."""
     ends = run.table["termination"].to_pylist()
     cells = [f"{100 * (ends.count(how) / len(ends)):.1f}" for how in TERMINATIONS]
-    cells.append(f"{run.episodes.n_actions.mean():.1f}")
-    for name, form in (
-        ("n_refused", ",.0f"), ("n_invalid", ",.0f"), ("n_requests", ",.0f"), ("input_tokens", ",.0f"),
-        ("output_tokens", ",.0f"), ("cost_usd", ",.2f"),
-    ):  # fmt: skip
-        column = run.table[name]
+    cells.append(f"{run.episodes['n_actions'].mean():.1f}")
+    for name in ("n_refused", "n_invalid", "n_requests", "input_tokens", "output_tokens", "cost_usd"):
+        column, digits = run.table[name], 2 if name == "cost_usd" else 0
         # A sum is not known where any episode does not know its part.
-        cells.append(NONE if column.null_count else f"{math.fsum(column.to_pylist()):{form}}")
+        cells.append(NONE if column.null_count else f"{math.fsum(column.to_pylist()):,.{digits}f}")
     return tuple(cells)
+
+
+_HEAD = ("run", "agent", "profile", "radius_m", "setting", "modality", "scope", "name", "episodes")
+_ENDS = tuple(f"{metric}_{end}95" for metric in METRICS for end in ("low", "high"))
+COLUMNS = (*_HEAD, *METRICS, *(f"{metric}_sd" for metric in METRICS), *_ENDS, "told")
+
+
+def as_csv(request: ReportRequest) -> str:
+    """Write every score as one row of a tidy CSV: fractions and metres, unrounded; empty where there is none."""
+    out = io.StringIO()
+    csv.writer(out, lineterminator="\n").writerows([COLUMNS, *_rows(request)])
+    return out.getvalue()
+
+
+def as_json(request: ReportRequest) -> str:
+    """Write the rows of `as_csv` as a JSON list of objects, a line each; null where there is nothing."""
+    rows = (dict(zip(COLUMNS, row, strict=True)) for row in _rows(request))
+    return "[\n" + ",\n".join(json.dumps(row, ensure_ascii=False, allow_nan=False) for row in rows) + "\n]\n"
+
+
+def _rows(request: ReportRequest) -> Iterator[list[Any]]:
+    for k, run in enumerate(request.runs):
+        settings, modalities = (
+            request.values(column, Cut(k), order)
+            for column, order in (("setting", SETTINGS), ("modality", MODALITIES))
+        )
+        parts = [("all", "all"), *((s, "all") for s in settings), *(("all", m) for m in modalities)]
+        parts += [
+            (s, m) for s in settings for m in request.values("modality", Cut(k, where=(("setting", s),)), MODALITIES)
+        ]
+        for profile in request.profiles:
+            for setting, modality in parts:
+                where = [(n, v) for n, v in (("setting", setting), ("modality", modality)) if v != "all"]
+                head = [run.name, run.agent, profile.name, profile.radius_m, setting, modality]
+                for row in _scores(request, Cut(k, profile, tuple(where))):
+                    yield [*head, *(None if isinstance(v, float) and math.isnan(v) else v for v in row), run.hints]
+    for result in request.paper_results:
+        for profile in request.profiles:
+            keys = [(metric, profile.radius_m) for metric in METRICS]
+            if profile.own and any(key in result.mean for key in keys):
+                row = [kind.get(key) for kind in (result.mean, result.spread) for key in keys]
+                head = ["paper", result.model, profile.name, profile.radius_m, result.setting, "all"]
+                yield [*head, "overall", "overall", None, *row, *[None] * len(_ENDS), ""]
+
+
+def _scores(request: ReportRequest, whole: Cut) -> Iterator[list[Any]]:
+    """Score a part of a log in every scope, with deviations and ends of intervals where they are known."""
+    summary, unknown = request.summary(whole), [math.nan] * (3 * len(METRICS))
+
+    def known(scope: str, name: str, cut: Cut) -> list[Any]:
+        own = request.summary(cut)
+        return [scope, name, *own.overall, *own.deviation[1:], *request.interval(cut).T.ravel().tolist()]
+
+    yield known("overall", "overall", whole)
+    yield ["task_weighted", "task_weighted", *request.score(whole | Cut(weighted=True)), *unknown]
+    yield from (["family", name, *score, *unknown] for name, score in summary.families.items())
+    for column in ("partition", "scene_type", "malls"):
+        for name in request.values(column, whole):
+            yield [column, name, *request.score(whole | Cut(where=((column, name),))), *unknown]
+    yield from (["scene", name, *score, *unknown] for name, score in summary.scenes.items())
+    if not whole.where:
+        for column, found in request.breakdowns.found.items():
+            for part in found.parts:
+                yield known(column, part, whole | Cut(where=((column, part),)))

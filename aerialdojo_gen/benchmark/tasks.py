@@ -24,6 +24,7 @@ from aerialdojo_gen.base.names import check_known
 from aerialdojo_gen.base.pictures import decode_rgb
 from aerialdojo_gen.benchmark.agents.goal import HINTS, Goal, Heading, Rules
 from aerialdojo_gen.dataset.contents import scenes_in_release
+from aerialdojo_gen.dataset.lookup import read_side
 from aerialdojo_gen.dataset.protocol import check_protocol, read_sample
 from aerialdojo_gen.geometry.frames import compass_heading
 from aerialdojo_gen.planning.flight_space import Point
@@ -94,15 +95,14 @@ def select(data: Where, selection: Selection) -> pa.Table:
         if sample is not None and scene not in sample.tasks:
             continue
         for subset in ("train", "test") if sample is None else ("test",):
-            split = f"{store.partition(scene)}_{subset}"
-            if split not in (selection.splits or SUBSETS):
+            if f"{store.partition(scene)}_{subset}" not in (selection.splits or SUBSETS):
                 continue
-            table = store.read_scene(root, f"tasks/{subset}", scene, _COLUMNS)
+            table = read_side(root, "tasks", subset, scene, _COLUMNS)
             table = table if sample is None else sample.of(scene, table)
             for column, chosen in (("setting", selection.settings), ("modality", selection.modalities)):
                 if chosen:
                     table = table.filter(pc.is_in(table[column], pa.array(chosen, pa.string())))
-            tables.append(table.append_column("split", pa.array([split] * table.num_rows, pa.string())))
+            tables.append(table)
     found = pa.concat_tables(tables) if tables else None
     if found is None or not found.num_rows:
         what = "the paper's sample, test tasks of base and standard," if selection.protocol else "the release"

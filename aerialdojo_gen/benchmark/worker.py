@@ -5,9 +5,9 @@ from __future__ import annotations
 import operator
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pyarrow as pa
 import pyarrow.compute as pc
@@ -18,8 +18,8 @@ from aerialdojo_gen.benchmark.agents import Agent, AgentUnavailable, InvalidAnsw
 from aerialdojo_gen.benchmark.agents.goal import N_ACTIONS, Goal, Observation
 from aerialdojo_gen.benchmark.agents.load import add_traceback, error_location
 from aerialdojo_gen.benchmark.agents.simple import OracleAgent, SubmittedAgent
+from aerialdojo_gen.benchmark.episodes import Journal
 from aerialdojo_gen.benchmark.flight import Flight
-from aerialdojo_gen.benchmark.journal import Journal
 from aerialdojo_gen.benchmark.tasks import Task, read_tasks, reference_actions
 from aerialdojo_gen.rendering.backend import close_renderers
 from aerialdojo_gen.store.root import DataRoot
@@ -37,8 +37,8 @@ class GuardedAgent:
 
     def __init__(self, agent: Agent, name: str, secrets: Secrets, tolerate: bool = False) -> None:
         self._agent, self._name, self._secrets, self._tolerate = agent, name, secrets, tolerate
-        self._answer: Any = getattr(agent, "answer", None)
-        self._used: Any = getattr(agent, "usage", None)
+        self._answer: Any = getattr(agent, "answer", lambda: None)
+        self._used: Any = getattr(agent, "usage", lambda: None)
         self.task = ""
 
     def reset(self, task_id: str, goal: Goal) -> None:
@@ -71,17 +71,15 @@ class GuardedAgent:
 
     def answer(self) -> str | None:
         """Return the agent's text for the last action, without secrets."""
-        if self._answer is None:
-            return None
         text = self._call("answer", self._answer)
         # Files cannot hold lone surrogates.
         return self._secrets.text(text.encode("utf-8", "replace").decode("utf-8")) if isinstance(text, str) else None
 
-    def usage(self) -> Usage | None:
-        """Return what was used since the last `reset`."""
-        used = self._call("usage", self._used) if self._used is not None else None
+    def usage(self) -> Usage:
+        """Return what was used since the last `reset`; nothing is known of an agent that does not say it."""
+        used = self._call("usage", self._used)
         if used is None or isinstance(used, Usage):
-            return used
+            return used or _UNKNOWN
         raise self._wrong(f"returned {_short(used)} from usage, where Usage or None is expected")
 
     def _call(self, what: str, method: Callable[..., Any], *args: Any) -> Any:
@@ -106,30 +104,15 @@ def _short(value: Any) -> str:
     return f"{text[:60]} ({type(value).__name__})"
 
 
-def _add_usage(a: Usage | None, b: Usage | None) -> Usage | None:
+_UNKNOWN = Usage(requests=None)
+
+
+def _add_usage(a: Usage, b: Usage) -> Usage:
     """Add the usage of two attempts; unknown counts stay unknown."""
-    if a is None or b is None:
-        return a or b
-
-    def both(name: str) -> Any:
-        known = [v for v in (getattr(a, name), getattr(b, name)) if v is not None]
-        return sum(known) if known else None
-
-    sums = {name: both(name) for name in ("requests", "input_tokens", "output_tokens", "cost_usd", "request_s")}
-    longest = [v for v in (a.longest_request_s, b.longest_request_s) if v is not None]
-    return Usage(**sums, longest_request_s=max(longest, default=None))
-
-
-def _usage_columns(used: Usage | None) -> dict[str, Any]:
-    """Usage columns of `episodes` and `failures`."""
-    columns = {name: getattr(used, name, None) for name in ("input_tokens", "output_tokens", "cost_usd")}
-    return {"n_requests": getattr(used, "requests", None)} | columns
-
-
-def _spent(used: Usage | None) -> dict[str, Any]:
-    """US dollars and tokens for a `Finished`; 0 if unknown."""
-    known = used or Usage()
-    return {"cost_usd": known.cost_usd or 0.0, "tokens": (known.input_tokens or 0) + (known.output_tokens or 0)}
+    known = {f.name: [v for v in (getattr(a, f.name), getattr(b, f.name)) if v is not None] for f in fields(Usage)}
+    longest_s = max(known.pop("longest_request_s"), default=None)
+    sums: dict[str, Any] = {name: sum(values) if values else None for name, values in known.items()}
+    return Usage(**sums, longest_request_s=longest_s)
 
 
 _LONGEST_PAUSE_S = 600.0
@@ -150,9 +133,8 @@ class WorkUnit:
         return f"evaluate {self.scene}"
 
 
-@dataclass(frozen=True)
-class Failed:
-    """An episode that failed for reasons outside the agent's choices."""
+class Failed(NamedTuple):
+    """Why an episode failed, for reasons outside the agent's choices."""
 
     kind: str
     reason: str
@@ -164,16 +146,15 @@ class Finished:
 
     episodes: int = 0  # Including failed ones
     actions: int = 0
-    cost_usd: float = 0.0
+    cost_usd: float = 0.0  # 0 if unknown, as tokens are
     tokens: int = 0
     flown: int = 0  # Episodes that did not fail
     streak: tuple[Failed, ...] = ()  # Failures since the last episode that did not fail
 
     def __add__(self, other: Finished) -> Finished:
         """Add later episodes."""
-        names = ("episodes", "actions", "cost_usd", "tokens", "flown")
-        sums = {name: getattr(self, name) + getattr(other, name) for name in names}
-        return Finished(**sums, streak=other.streak if other.flown else self.streak + other.streak)
+        sums = {f.name: getattr(self, f.name) + getattr(other, f.name) for f in fields(self)}
+        return Finished(**sums | ({"streak": other.streak} if other.flown else {}))
 
 
 @dataclass(frozen=True)
@@ -221,33 +202,35 @@ class Worker:
 
     def _finish(self, task: Task, stopped: Callable[[], bool]) -> tuple[dict[str, Any], Finished] | None:
         """Fly one episode, with retries after external failures; None if the run is stopped meanwhile."""
-        used: Usage | None = None
-        attempt, failed = 0, Failed("", "")
-        while attempt < self._retry_policy.attempts:
+        used = _UNKNOWN
+        record, failed, attempt, again = None, Failed("", ""), 0, True
+        while record is None and again and attempt < self._retry_policy.attempts:
             attempt += 1
             try:
                 record = self._episode(task)
             except AgentUnavailable as error:
                 used = _add_usage(used, self._guarded.usage())
-                failed = Failed(error.kind, self._line(error))
-                if not error.again:
-                    break
-                if attempt < self._retry_policy.attempts and not self._pause(attempt, error.retry_after_s, stopped):
+                failed, again = Failed(error.kind, self._line(error)), error.again
+                left = again and attempt < self._retry_policy.attempts
+                if left and not self._pause(attempt, error.retry_after_s, stopped):
                     return None
-                continue
             except AgentError as error:
                 if not self._retry_policy.tolerate:
                     raise
-                failed = Failed("agent error", self._line(error))
-                break
+                failed, again = Failed("agent error", self._line(error)), False
+        if record is not None:
             used = _add_usage(used, self._guarded.usage())
-            record["episode"] |= _usage_columns(used)
-            times = {name: getattr(used, name, None) for name in ("request_s", "longest_request_s")}
-            record["timing"] |= {"attempts": attempt} | times
-            return record, Finished(1, record["episode"]["n_actions"], **_spent(used), flown=1)
-        row = {"attempts": attempt, "kind": failed.kind, "reason": failed.reason} | _usage_columns(used)
-        record = {"task_id": task.row["task_id"], "failure": self._key(task) | row}
-        return record, Finished(1, **_spent(used), streak=(failed,))
+        columns = {name: getattr(used, name) for name in ("input_tokens", "output_tokens", "cost_usd")}
+        columns["n_requests"] = used.requests
+        tokens = (used.input_tokens or 0) + (used.output_tokens or 0)
+        spent = Finished(1, cost_usd=used.cost_usd or 0.0, tokens=tokens)
+        if record is None:
+            row = self._key(task) | {"attempts": attempt} | failed._asdict() | columns
+            return {"task_id": task.row["task_id"], "failure": row}, replace(spent, streak=(failed,))
+        record["episode"] |= columns
+        times = {"request_s": used.request_s, "longest_request_s": used.longest_request_s}
+        record["timing"] |= {"attempts": attempt} | times
+        return record, replace(spent, actions=record["episode"]["n_actions"], flown=1)
 
     def _pause(self, attempt: int, requested_s: float | None, stopped: Callable[[], bool]) -> bool:
         """Wait before the next attempt; False if the run is stopped meanwhile."""

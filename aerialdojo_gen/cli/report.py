@@ -115,7 +115,7 @@ def report(
 ) -> None:
     """Score runs of evaluate: SR, SR-view, OSR, SPL, DTS and CR as tables, figures or a page."""
     from aerialdojo_gen.base.paper_figures import results
-    from aerialdojo_gen.benchmark import registry, score_rows
+    from aerialdojo_gen.benchmark import registry, tables
     from aerialdojo_gen.benchmark.episodes import runs as runs_there
     from aerialdojo_gen.benchmark.metrics import DEFAULT_PROFILES, at_radius, profile_named
     from aerialdojo_gen.benchmark.paired import paired_tables
@@ -141,7 +141,7 @@ def report(
     )
     if style in ("csv", "json"):
         extra_rules = [at_radius(rules[0], r) for r in radius or () if r not in {rule.radius_m for rule in rules}]
-        write = score_rows.as_csv if style == "csv" else score_rows.as_json
+        write = tables.as_csv if style == "csv" else tables.as_json
         print(write(replace(request, profiles=[*rules, *extra_rules])), end="")
     elif paired and table is None:
         _show(paired_tables(named, rules), style)

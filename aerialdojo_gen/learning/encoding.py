@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from aerialdojo_gen.benchmark.agents.base import Odometer
 from aerialdojo_gen.benchmark.agents.goal import N_ACTIONS, Sensors
 from aerialdojo_gen.geometry.motion import DISPLACEMENTS, N_HEADINGS, TURN_RAD, TURNS
 from aerialdojo_gen.store.schemas import ACTION_NAMES, STOP
@@ -42,42 +43,36 @@ def goal_picture(image: NDArray[np.uint8] | None, size_px: int) -> NDArray[np.ui
     return out
 
 
-class DeadReckoning:
-    """Where a body is that adds up its own actions, in the frame of its start."""
+class DeadReckoning(Odometer):
+    """Where a body is that adds up its own actions, and where it has been."""
 
     def __init__(self) -> None:
-        self._place = np.zeros(3)
-        self._headings = 0
+        super().__init__()
         self._turns = 0
-        self._been = {_pose(self._place, 0)}
+        self._been = {_pose(self.place, 0)}
 
     def add(self, action: int, refused: bool = False) -> None:
         """Add an action; one that was refused moved nothing, and its end counts as a pose where the body has been."""
-        place, headings = self._after(action)
-        self._been.add(_pose(place, headings))
+        self._been.add(self._pose_after(action))
+        super().add(action, refused)
         if not refused:
-            self._place, self._headings = place, headings
             self._turns = self._turns + 1 if TURNS[action] else 0
 
     @property
     def back(self) -> NDArray[np.bool_]:
         """Actions, (16,) bool, that no route has here: to earlier poses, or turns beyond half a circle in place."""
         turned = self._turns >= N_HEADINGS // 2
-        found = [(turned and bool(TURNS[a])) or _pose(*self._after(a)) in self._been for a in range(N_ACTIONS)]
+        found = [(turned and bool(TURNS[a])) or self._pose_after(a) in self._been for a in range(N_ACTIONS)]
         found[STOP] = False
         return np.array(found)
 
-    def _after(self, action: int) -> tuple[NDArray[np.float64], int]:
-        angle = self._headings * TURN_RAD
-        c, s = np.cos(angle), np.sin(angle)
-        ahead, left, up = DISPLACEMENTS[action]
-        place = self._place + np.array([c * ahead - s * left, s * ahead + c * left, up])
-        return place, self._headings + int(TURNS[action])
+    def _pose_after(self, action: int) -> tuple[int, int, int, int]:
+        return _pose(self.place + self.displacement(action), self.headings + int(TURNS[action]))
 
     @property
     def odometry(self) -> NDArray[np.float32]:
         """X ahead, y left, z up in metres and yaw in radians: (4,) float32."""
-        return np.array([*self._place, self._headings * TURN_RAD], np.float32)
+        return np.array([*self.place, self.yaw_rad], np.float32)
 
 
 def _pose(place: NDArray[np.float64], headings: int) -> tuple[int, int, int, int]:

@@ -37,7 +37,7 @@ KEPT = ("pipeline.scoring", "pipeline.stage", "pipeline.stages.work", *_WRITERS)
 # Empty: the configuration names it, or it imports what the module's callers import themselves.
 BY_NAME: dict[str, tuple[str, ...]] = {
     "__init__": (),
-    "base.llm_client.service": (),
+    "base.llm_client": (),
     "benchmark.agents.load": (),
     "dataset.validate.run": ("dataset.validate.*",),
     "imports.assimp": ("assimp_py",),

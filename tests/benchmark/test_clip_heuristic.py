@@ -14,7 +14,7 @@ from aerialdojo_gen.benchmark.episodes import read_run
 from aerialdojo_gen.store.schemas import ACTION_NAMES
 
 RED, REDDISH, GREY, BLUE = (220, 30, 30), (200, 120, 120), (128, 128, 128), (30, 40, 210)
-EYES = Sensors(width=16, height=16)
+CAMERAS = Sensors(width=16, height=16)
 
 
 @pytest.fixture(scope="module")
@@ -27,7 +27,7 @@ def agent_of(clip, **options):
     return load_agent("clip", **paths, **options)
 
 
-def begun(clip, image=None, sensors=EYES, **options):
+def begun(clip, image=None, sensors=CAMERAS, **options):
     """An agent at the start of an episode; it stops at nothing that is not asked for."""
     agent = agent_of(clip, **{"stop": 2.0, "stop_image": 2.0} | options)
     words = None if image is not None else "a red post"
@@ -62,14 +62,11 @@ def test_it_moves_towards_the_view_that_fits_the_goal(clip):
     assert done(begun(clip, image=plain(BLUE)), front=RED, right=BLUE) == "MoveRight1"
 
 
-def test_it_does_not_go_back_sideways_where_it_came_from(clip):
+def test_it_does_not_go_back_sideways_and_moves_down_only_where_nothing_is_near(clip):
     agent = begun(clip)
     assert done(agent, left=RED) == "MoveLeft1"
     assert done(agent, right=RED, front=REDDISH) == "MoveForward1"
     assert done(agent, right=RED, front=REDDISH) == "MoveRight1"
-
-
-def test_it_moves_down_only_where_nothing_is_near(clip):
     for depth_m, action in ((40.0, "MoveDown1"), (0.0, "MoveDown1"), (5.0, "MoveForward1")):
         assert done(begun(clip), down=RED, front=REDDISH, depth_m=depth_m) == action
 

@@ -1,4 +1,4 @@
-"""The environment: motion, collision, what ends an episode, Gymnasium's contract."""
+"""The environment: motion, collision, what ends an episode, Gymnasium's contract; worlds from seeds."""
 
 import math
 import os
@@ -10,15 +10,19 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from support.browser import until
 from support.handmade import box, instance, scene
 
-from aerialdojo_gen.base.errors import RenderError, StoreError, UsageError
+import aerialdojo_gen.benchmark  # noqa: F401 - registers the environment
+from aerialdojo_gen.base.errors import AerialDojoError, RenderError, StoreError, UsageError
 from aerialdojo_gen.benchmark import AerialDojoEnv
 from aerialdojo_gen.benchmark.agents.goal import N_ACTIONS
+from aerialdojo_gen.benchmark.worlds import WorldMaker
 from aerialdojo_gen.dataset.episode import Episode
 from aerialdojo_gen.geometry.motion import replay, route_length_m
 from aerialdojo_gen.planning.collision import CollisionWorld
 from aerialdojo_gen.planning.flight_space import FlightSpace
+from aerialdojo_gen.scenes.worlds.world import World
 from aerialdojo_gen.store import schemas
 
 RADIUS = 0.25
@@ -87,19 +91,11 @@ def test_a_start_in_collision_ends_so_at_the_first_action(yard, first):
     assert episode.position == (5.1, 0.0, 2.0)
 
 
-def test_the_fence_refuses_and_spends(yard):
-    start = (0.0, 9.0, 2.0, math.pi / 2)
-    episode = fly(yard, "MoveForward5", start=start)
-    assert (episode.refused, episode.n_refused, episode.n_actions) == (True, 1, 1)
-    assert (episode.position, episode.path_length_m, episode.termination) == ((0.0, 9.0, 2.0), 0.0, None)
-    episode.step(ID["MoveRight1"])
-    assert not episode.refused
-    assert fly(yard, "MoveForward5", start=start, budget=1).termination == "budget"
-
-
 def test_an_answer_without_an_action_spends_one(yard):
     episode = fly(yard, None, None, budget=2)
     assert (episode.n_invalid, episode.n_actions, episode.termination) == (2, 2, "budget")
+    refused = fly(yard, "MoveForward5", start=(0.0, 9.0, 2.0, math.pi / 2), budget=1)
+    assert (refused.n_refused, refused.n_actions, refused.termination) == (1, 1, "budget"), "the fence spends one too"
     with pytest.raises(ValueError, match="0 to 15"):
         fly(yard).step(schemas.APPROACH)
     with pytest.raises(ValueError, match="0 to 15"):
@@ -183,10 +179,10 @@ def test_a_chosen_task_and_what_ends_it(smoke):
         observation, _, terminated, truncated, info = env.step(schemas.TURN_LEFT)
         assert truncated == (k == row["action_budget"] - 1)
         assert not terminated
-    told = {"task_id": row["task_id"], "success": False, "distance_m": math.dist(env.episode.position, env.task.goal)}
-    assert info == {"reason": "budget"} | told
+    last = {"task_id": row["task_id"], "success": False, "distance_m": math.dist(env.episode.position, env.task.goal)}
+    assert info == {"reason": "budget"} | last
     env.reset(options={"task_id": row["task_id"]})
-    ended = (0.0, True, False, {"reason": "stop"} | told)
+    ended = (0.0, True, False, {"reason": "stop"} | last)
     assert env.step(0)[1:] == ended, "the start is never within 3 m of the goal"
     with pytest.raises(RuntimeError, match="stop"):
         env.step(0)
@@ -239,16 +235,15 @@ def test_vectorised(smoke, mode):
         ({"scenes_in_memory": 0}, "at least 1, not 0"),
         ({"episodes_per_scene": 0}, "at least 1, not 0"),
         ({"paraphrase": "all"}, "no choice of paraphrase 'all'"),
+        ({"data": "/dev"}, "there is no release in"),
     ],
 )
 def test_what_does_not_exist_is_named(smoke, keywords, message):
-    with pytest.raises(UsageError, match=message):
-        AerialDojoEnv(smoke, **keywords)
+    with pytest.raises((UsageError, StoreError), match=message):
+        AerialDojoEnv(**{"data": smoke} | keywords)
 
 
-def test_a_release_and_a_task_that_are_not_there_are_named(smoke, tmp_path):
-    with pytest.raises(StoreError, match="there is no release in"):
-        AerialDojoEnv(tmp_path)
+def test_a_task_that_is_not_there_is_named(smoke):
     env = AerialDojoEnv(smoke, views=())
     with pytest.raises(UsageError, match="no task 'U_X_0-1-s'"):
         env.reset(options={"task_id": "U_X_0-1-s"})
@@ -262,3 +257,83 @@ def test_a_fork_of_a_process_that_has_drawn_is_told_so_and_does_not_hang(seeing,
     monkeypatch.setattr(observations, "_opengl_process", [os.getppid()])
     with pytest.raises(RenderError, match="start it by spawn"):
         seeing.reset(seed=0)
+
+
+GIVEN = {"worlds": "U_Alley", "num_worlds": 2, "episodes_per_world": 2, "n_objects": 6, "views": ()}
+
+
+def episodes(env, n):
+    """Worlds and tasks of some episodes, each ended at once."""
+    found = []
+    for k in range(n):
+        observation, _ = env.reset(seed=5 if k == 0 else None)
+        assert observation in env.observation_space
+        *_, info = env.step(0)
+        found.append((env.unwrapped.world, info["task_id"]))
+    return found
+
+
+def test_a_world_that_cannot_be_made_says_why_and_the_next_one_is_made(worlds_cache):
+    maker = WorldMaker("U_Alley", n_objects=6, folder=worlds_cache)
+    wrong, (right,) = World("U_Alley", 7, {"relief_m": 3.0}), maker.worlds
+    for world in (wrong, right):
+        maker.prepare(world)
+    child = until("a process", lambda: maker._child)
+    with pytest.raises(AerialDojoError, match=r"U_Alley-7 could not be made: .*relief_m"):
+        maker.root(wrong)
+    assert (maker.root(right) / "release" / "tasks").is_dir()
+    maker.close()
+    assert child.poll() == 0, "nobody waits any more"
+
+
+@pytest.mark.slow
+def test_episodes_go_through_worlds_that_are_made_once(worlds_cache):
+    env = gymnasium.make("AerialDojo-v0", **GIVEN, cache=worlds_cache)
+    first = episodes(env, 6)
+    env.close()
+    worlds = [world for world, _ in first]
+    assert set(worlds) == {"U_Alley-1000", "U_Alley-1001"}
+    assert worlds[0] == worlds[1]
+    assert worlds[2] == worlds[3] != worlds[0]
+    assert all(task.startswith(world) for world, task in first)
+
+    def made():
+        return {path: path.stat().st_mtime_ns for path in worlds_cache.glob("*/*/data/release/tasks/**/*.parquet")}
+
+    before = made()
+    assert before
+    again = gymnasium.make("AerialDojo-v0", **GIVEN, cache=worlds_cache)
+    assert episodes(again, 6) == first, "the seed alone decides worlds and tasks"
+    again.reset(options={"world": "U_Alley-1001"})
+    assert again.unwrapped.world == "U_Alley-1001"
+    with pytest.raises(UsageError, match="no world 'U_Alley-1002'"):
+        again.reset(options={"world": "U_Alley-1002"})
+    again.close()
+    assert made() == before
+
+
+def test_closing_stops_the_process_that_makes_a_world(tmp_path):
+    maker = WorldMaker("N_Snowfield", folder=tmp_path)
+    maker.prepare(maker.worlds[0])
+    until("a process", lambda: maker._child)
+    child, coming = maker._child, maker._coming[maker.worlds[0].name]
+    maker.close()
+    assert child.poll() is not None
+    with pytest.raises(AerialDojoError, match="N_Snowfield-1000"):
+        coming.result()
+    assert not list(tmp_path.glob("[0-9a-f][0-9a-f]/*")), "nothing half-made is kept"
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"worlds": "U_Nowhere"}, "U_Nowhere"),
+        ({"worlds": "N_Snowfield", "num_worlds": 0}, "at least 1 world"),
+        ({"worlds": "N_Snowfield", "start_seed": -1}, "seeds from 0"),
+        ({"worlds": "N_Snowfield", "data": "data"}, "data and worlds"),
+        ({"worlds": "N_Snowfield", "episodes_per_world": 0}, "episodes_per_world"),
+    ],
+)
+def test_requests_that_make_no_sense(given, said):
+    with pytest.raises(UsageError, match=said):
+        gymnasium.make("AerialDojo-v0", **given)

@@ -36,22 +36,18 @@ def test_wrappings_that_are_not_part_of_the_answer_come_off(text):
     [
         ("", "it is empty"),
         ("Stop", "not one JSON object"),
-        ('I would go on: {"action": "Stop"}', "not one JSON object"),
         ('{"action": "Stop"} That is all.', "not one JSON object"),
         ('["Stop"]', "JSON, but no object: list"),
         ("{}", "action: Field required"),
         ('{"action": 0}', "action: Input should be a valid string"),
         ('{"action": "stop"}', "'stop' is none of the actions"),
-        ('{"action": "Approach"}', "'Approach' is none of the actions"),
         ('{"action": "Stop", "confidence": 1}', "confidence: Extra inputs are not permitted"),
         ('{"action": "Stop", "action": "MoveUp1"}', "duplicate key"),
         ("[" * 10_000, "not one JSON object"),
-        ('{"a":' * 3_000 + "1" + "}" * 3_000, "not one JSON object|a: Extra inputs"),
         ('{"thought": ' + "9" * 5_000 + ', "action": "Stop"}', "not one JSON object .*digits"),
         ('{"thought": 1e999, "action": "Stop"}', "thought: Input should be a valid string"),
         ('{"thought": NaN, "action": "Stop"}', "NaN is no number of JSON"),
         ('{"thought": "\\ud800", "action": "Stop"}', "half of a surrogate pair|valid string"),
-        ('{"action": "\\udfff"}', "surrogate|none of the actions|valid string"),
         ('{"\\ud800": 1, "action": "Stop"}', "Extra inputs|surrogate|valid string"),
         (" " * 20_001, "20,001 characters"),
     ],
@@ -75,20 +71,20 @@ IMAGE = Goal("image", "red van", "clock tower", "northeast", None, np.zeros((4, 
 
 
 def test_the_prompt_holds_what_appendix_a_asks_for():
-    told = system_prompt(SEMANTIC, Options(model="m"))
+    prompt = system_prompt(SEMANTIC, Options(model="m"))
     for words in (
         *(f"- {name}: " for name in ACTION_NAMES[:APPROACH]), "fly 5 m forward", "turn 15° to the left", "sink 2 m",
         "wheelbase of 0.25 m", "within 3 m", "budget of 180 actions", "black at 0 m to white at 50 m",
         "640 x 640 pixels", "picture of the step before is shown again", json.dumps(SIXTEEN.schema()),
     ):  # fmt: skip
-        assert words in told
-    assert "left (looks" not in told
-    assert "Approach" not in told
+        assert words in prompt
+    assert "left (looks" not in prompt
+    assert "Approach" not in prompt
     assert "depth" not in system_prompt(SEMANTIC, Options(model="m", depth=False))
     assert "shown again" not in system_prompt(SEMANTIC, Options(model="m", history_images=0))
     # Its own example of an answer is one, once the blanks are filled: with any of the actions.
     for k, name in enumerate(ACTION_NAMES[:APPROACH]):
-        example = told.splitlines()[-1].replace("<one name from the list above>", name)
+        example = prompt.splitlines()[-1].replace("<one name from the list above>", name)
         assert SIXTEEN.ids[parse_answer(example).action] == k
 
 
@@ -99,23 +95,20 @@ def test_the_papers_eight_actions_have_common_magnitudes():
         "MoveUp": "MoveUp2", "MoveDown": "MoveDown2", "TurnLeft": "TurnLeft15", "TurnRight": "TurnRight15",
     }  # fmt: skip
     options = Options(model="m", actions="eight", move_m=5, climb_m=2)
-    told = system_prompt(SEMANTIC, options)
-    assert "- MoveForward: fly 5 m forward" in told
-    assert "MoveForward5" not in told
+    prompt = system_prompt(SEMANTIC, options)
+    assert "- MoveForward: fly 5 m forward" in prompt
+    assert "MoveForward5" not in prompt
     assert parse_answer('{"action": "MoveUp"}', actions.names).action == "MoveUp"
     with pytest.raises(InvalidAnswer, match="'MoveUp2' is none of the actions"):
         parse_answer('{"action": "MoveUp2"}', actions.names)
     assert 'Call the tool "act"' in system_prompt(SEMANTIC, options, "tool")
 
 
-def test_the_goal_is_told_as_its_modality_has_it():
+def test_the_goal_is_told_as_its_modality_has_it_and_a_step_tells_the_budget_the_history_and_a_refusal():
     assert goal_text(SEMANTIC).endswith("Description: A red van by a hedge.")
     for goal in (SEMANTIC, IMAGE):
         assert "TARGET: red van. It lies northeast of the landmark nearest to it: clock tower." in goal_text(goal)
     assert "None" not in goal_text(IMAGE)
-
-
-def test_a_step_tells_the_budget_the_history_and_a_refusal():
     turns = [Turn(5, "MoveUp1", "Higher."), Turn(6, None)]
     said = step_text(Observation(7, 173, refused=True), turns)
     assert "- step 5: MoveUp1. Higher." in said

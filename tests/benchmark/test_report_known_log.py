@@ -1,4 +1,4 @@
-"""The report of a log written by hand: two agents and a floor, four families, both partitions; figures by hand."""
+"""The report of a log written by hand: two agents and a baseline, four families, both partitions; figures by hand."""
 
 import csv
 import io
@@ -16,9 +16,9 @@ from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.base.paper_figures import results
 from aerialdojo_gen.base.table_formats import as_text
 from aerialdojo_gen.base.text_table import BEST, SECOND
-from aerialdojo_gen.benchmark import intervals, paired, registry, score_rows
-from aerialdojo_gen.benchmark.metrics import PROFILES, summarize
-from aerialdojo_gen.benchmark.runs import group_runs, load_runs, with_baselines
+from aerialdojo_gen.benchmark import paired, registry, tables
+from aerialdojo_gen.benchmark.metrics import PROFILES, bootstrap, summarize
+from aerialdojo_gen.benchmark.runs import group_runs, load_runs, mark_adapted, with_baselines
 from aerialdojo_gen.benchmark.tables import ReportRequest
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
@@ -80,8 +80,8 @@ def log(tmp_path_factory):
     data = tmp_path_factory.mktemp("known")
     write(data, "alpha", "package:Alpha", LOG["alpha"])
     write(data, "beta", "package:Beta", LOG["beta"])
-    # The floor has flown more than these tasks.
-    write(data, "floor", "stop", LOG["stop"], more="S")
+    # The baseline has flown more than these tasks.
+    write(data, "base", "stop", LOG["stop"], more="S")
     return data
 
 
@@ -99,20 +99,20 @@ def cells(table, label):
     return next(row for name, row in table.rows if name == label)
 
 
-def test_the_floors_that_flew_the_same_tasks_are_added_and_cut_down(log, runs):
+def test_baselines_that_flew_the_same_tasks_are_added_and_cut_down(log, runs):
     assert [(run.name, run.group, len(run.episodes)) for run in runs] == [
-        ("alpha", "agents", 18), ("beta", "agents", 18), ("floor", "baselines", 18)
+        ("alpha", "agents", 18), ("beta", "agents", 18), ("base", "baselines", 18)
     ]  # fmt: skip
-    # Of the floor's own tasks, alpha has flown a part: it is no floor's business.
-    alone = with_baselines(log, load_runs(log, ["floor"]))
-    assert [run.name for run in alone] == ["floor"]
+    # Of the baseline's own tasks, alpha has flown a part: no baseline is added to it.
+    alone = with_baselines(log, load_runs(log, ["base"]))
+    assert [run.name for run in alone] == ["base"]
     other = log.parent / "other"
     write(other, "alpha", "package:Alpha", LOG["alpha"], more="M")
-    write(other, "floor", "stop", LOG["stop"])
+    write(other, "base", "stop", LOG["stop"])
     assert [run.name for run in with_baselines(other, load_runs(other, ["alpha"]))] == ["alpha"]
     groups = {"open": ["alpha"], "closed": ["package:Beta"]}
     assert [run.group for run in group_runs(runs, groups)] == ["open", "closed", "baselines"]
-    with pytest.raises(UsageError, match="group 'open': no run 'gamma': there are alpha, beta, floor"):
+    with pytest.raises(UsageError, match="group 'open': no run 'gamma': there are alpha, beta, base"):
         group_runs(runs, {"open": ["gamma"]})
 
 
@@ -155,7 +155,7 @@ def test_tables_4_and_5_with_the_papers_rows(runs):
     assert made("results", runs, intervals=False).rows[1][0] == "package:Beta"
     assert max(map(len, as_text(table, 120).splitlines())) <= 120
     # As CSV.
-    found = list(csv.DictReader(io.StringIO(score_rows.as_csv(request))))
+    found = list(csv.DictReader(io.StringIO(tables.as_csv(request))))
     keys = ("agent", "radius_m", "setting", "scope", "name")
     by_key = {tuple(row[key] for key in keys): row for row in found if row["modality"] == "all"}
     opus = by_key["Claude Opus 5", "3.0", "base", "overall", "overall"]
@@ -180,6 +180,10 @@ def test_tables_of_parts(runs, log):
     assert (partition[0], partition[5], partition[10]) == ("18.75", "25.00", "+6.25")
     # OSR ¼, 1, 1, 1 and ½, 0, 1, 0.
     assert (partition[1], partition[6], partition[11]) == ("81.25", "37.50", "−43.75")
+    # Of scenes that the agent was trained on, Coast_1 and Harbor_1 say 0 and 1: they are no longer OOD.
+    options = '{"trained_on": ["N_Coast_1", "I_Harbor_1", "U_Mall_0"]}'
+    trained = replace(runs[0], table=mark_adapted(runs[0].table, options))
+    assert cells(made("partition", [trained]), "package:Alpha")[::5] == ("18.75", "0.00", "50.00", "−18.75")
     # Semantic goals: Mall_0 1 of 2, Coast_0 1, Harbor_1 1; image goals: Harbor_1 1.
     goal = cells(made("goal", runs), "package:Alpha")
     assert (goal[0], goal[5], goal[10]) == ("31.25", "12.50", "−18.75")
@@ -224,7 +228,7 @@ def test_radii_gains_reversals_and_what_lies_between_poses(runs):
     assert lost == ("18", "10", "4", "6", "16.7", "50.0", "16.7", "16.7")
     assert cells(made("visits", runs), "stop") == ("18", "0", "0", "0", "–", "–", "–", "–")
     assert runs[0].path_clearance_to_goal_m is not None
-    assert min(runs[0].path_clearance_to_goal_m[runs[0].episodes.scene == "N_Coast_1"]) == pytest.approx(2.8)
+    assert min(runs[0].path_clearance_to_goal_m[runs[0].episodes["scene"] == "N_Coast_1"]) == pytest.approx(2.8)
 
 
 def test_a_log_without_steps_has_no_distances_along_the_way(log, tmp_path):
@@ -246,32 +250,36 @@ def test_a_paired_comparison_is_of_common_tasks_and_exact(log, runs):
     # In the other order the same with the sign turned round.
     back = cells(paired.paired_tables(runs[1::-1], [AT_3])[0], "SR ↑")
     assert (back[2], back[4]) == ("+9.38", "0.750")
-    whole = load_runs(log, ["floor", "alpha"])
+    whole = load_runs(log, ["base", "alpha"])
     assert paired.paired_tables(whole, [AT_3])[0].notes[0].startswith("18 tasks")
     with pytest.raises(UsageError, match="two runs, not 3"):
         paired.paired_tables(runs, [AT_3])
-    apart = [runs[0].where(runs[0].episodes.scene == "U_Mall_0"), runs[1].where(runs[1].episodes.scene == "U_Mall_1")]
+    apart = [
+        runs[0].where(runs[0].episodes["scene"] == "U_Mall_0"),
+        runs[1].where(runs[1].episodes["scene"] == "U_Mall_1"),
+    ]
     with pytest.raises(UsageError, match="alpha and beta have no task in common"):
         paired.paired_tables(apart, [AT_3])
 
 
 def test_intervals_are_the_exact_ones(runs):
-    found = intervals.score_intervals(summarize(runs[0].episodes, AT_3))
-    families = [part[:, 0].tolist() for part in intervals.scene_scores(summarize(runs[0].episodes, AT_3))]
+    scored = summarize(runs[0].episodes, AT_3).scene_scores()
+    found = bootstrap(scored)
+    families = [part[:, 0].tolist() for part in scored]
     assert families == [[0.25, 0.0], [0.5, 0.0], [0.0, 1.0], [0.0, 0.0]]
     # Every draw of two scenes a family, all alike likely.
     draws = product(*(list(product(scenes, repeat=2)) for scenes in families))
     means = sorted(sum(sum(draw) / 2 for draw in drawn) / 4 for drawn in draws)
-    low, high = found[0]
+    low, high = found[:, 0]
     assert np.mean(np.array(means) < low - 1e-9) <= 0.03 <= 0.2
     assert low == pytest.approx(np.quantile(means, 0.025), abs=0.016)
     assert high == pytest.approx(np.quantile(means, 0.975), abs=0.016)
-    np.testing.assert_equal(found, intervals.score_intervals(summarize(runs[0].episodes, AT_3)))
+    np.testing.assert_equal(found, bootstrap(scored))
     # The log does not say SR-view: that has no interval, and the others have theirs.
-    assert [math.isnan(low) for low, _ in found] == [False, True, False, False, False, False]
+    assert np.isnan(found).tolist() == [[False, True, False, False, False, False]] * 2
     # How far scenes differ is not known of a family with one of them.
-    one = runs[0].episodes.where(runs[0].episodes.scene != "U_Mall_1")
-    assert all(math.isnan(end) for ends in intervals.score_intervals(summarize(one, AT_3)) for end in ends)
+    one = runs[0].episodes[runs[0].episodes["scene"] != "U_Mall_1"]
+    assert np.isnan(bootstrap(summarize(one, AT_3).scene_scores())).all()
 
 
 def test_tables_are_chosen_by_name(log, runs):

@@ -9,7 +9,7 @@ import numpy as np
 from fuzzing.cases import Case, Target, made
 from support import court
 
-from aerialdojo_gen.benchmark import journal
+from aerialdojo_gen.benchmark import episodes
 from aerialdojo_gen.benchmark.llm.answer import parse_answer
 from aerialdojo_gen.pipeline.scoring.vlm import read_order
 from aerialdojo_gen.rendering import finished
@@ -121,7 +121,7 @@ def _journals() -> list[Case]:
 
 
 def _read_journal(folder: Path) -> None:
-    for record in journal.read_journal(folder / "x.jsonl"):
+    for record in episodes.read_journal(folder / "x.jsonl"):
         json.dumps(record).encode()
 
 

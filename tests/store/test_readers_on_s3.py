@@ -16,7 +16,7 @@ from support.s3_server import upload
 from support.task_files import uav_on, write
 
 from aerialdojo_gen.base.errors import StoreError
-from aerialdojo_gen.benchmark import episodes, journal
+from aerialdojo_gen.benchmark import episodes
 from aerialdojo_gen.benchmark.agents.goal import Sensors
 from aerialdojo_gen.benchmark.evaluation import Evaluation
 from aerialdojo_gen.benchmark.runner import evaluate
@@ -92,7 +92,7 @@ def test_episodes_are_the_same_rows_and_lie_in_the_bucket(capsys, smoke, uploade
     for table in ("episodes", "steps"):
         assert episodes.read_run(uploaded, "r", table).equals(episodes.read_run(tmp_path / "log", "r", table))
     assert evaluate(uploaded, job).flown == 0
-    assert not journal.Journals(open_root(uploaded), "r")
+    assert not episodes.Journals(open_root(uploaded), "r")
     told = [said(capsys, "report", "--data", d, "--log", log, "--format", "csv") for d, log in
             ((smoke, tmp_path / "log"), (uploaded, uploaded))]  # fmt: skip
     assert told[0] == told[1]
@@ -103,13 +103,13 @@ def test_episodes_are_the_same_rows_and_lie_in_the_bucket(capsys, smoke, uploade
 def test_another_machine_goes_on_from_the_last_checkpoint(uploaded, tmp_path, monkeypatch):
     """A killed run's journals of this machine are gone: what was committed is not flown again."""
     program = f"""
-from aerialdojo_gen.benchmark import journal, worker
+from aerialdojo_gen.benchmark import episodes, worker
 from aerialdojo_gen.benchmark.evaluation import Evaluation
 from aerialdojo_gen.benchmark.agents.goal import Sensors
 from aerialdojo_gen.benchmark.runner import evaluate
 from aerialdojo_gen.benchmark.tasks import Selection
 import os, signal
-journal.CHECKPOINT_S = 0.0
+episodes.CHECKPOINT_S = 0.0
 fly, flown = worker.Worker._episode, []
 def killed(self, task):
     flown.append(task)

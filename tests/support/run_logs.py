@@ -11,7 +11,6 @@ import pyarrow as pa
 
 from aerialdojo_gen.base import rng
 from aerialdojo_gen.base.paper_figures import inventory
-from aerialdojo_gen.benchmark.metrics import episodes_of
 from aerialdojo_gen.benchmark.runs import Run
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
@@ -63,7 +62,7 @@ def episodes_in(scene: str, run: str, agent: str, per_scene: int) -> pa.Table:
 def made_run(agent: str, per_scene: int = 6, scenes: Sequence[str] = ()) -> Run:
     """Make a run as it is read from a log, without its steps."""
     table = pa.concat_tables([episodes_in(scene, agent, agent, per_scene) for scene in scenes or sorted(inventory())])
-    return Run(agent, agent, agent, "{}", table, episodes_of(table))
+    return Run(agent, agent, agent, "{}", table)
 
 
 def write_run(data: Path, run: str, agent: str, scenes: Sequence[str], per_scene: int = 6, failed: int = 0) -> None:

@@ -1,12 +1,17 @@
-"""The interface of an agent, and what it may raise."""
+"""The interface of an agent, what it may raise, and the dead reckoning of those that want to know where they are."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
+import numpy as np
+from numpy.typing import NDArray
+
 from aerialdojo_gen.base.errors import AerialDojoError
 from aerialdojo_gen.benchmark.agents.goal import Goal, Observation
+from aerialdojo_gen.geometry.motion import DISPLACEMENTS, TURN_RAD, TURNS
 
 
 class InvalidAnswer(AerialDojoError):  # noqa: N818
@@ -17,7 +22,7 @@ class InvalidAnswer(AerialDojoError):  # noqa: N818
 class Usage:
     """What an agent has used since its last `reset`; None where it is not known."""
 
-    requests: int = 0  # Calls of an outside service, repeated ones too
+    requests: int | None = 0  # Calls of an outside service, repeated ones too
     input_tokens: int | None = None
     output_tokens: int | None = None
     cost_usd: float | None = None
@@ -77,3 +82,28 @@ class AgentBase:
     def answer(self) -> str | None:
         """Return the words behind the last action, if there are any."""
         return None
+
+
+class Odometer:
+    """Where a body is that adds up its own actions, in the frame of its start: x ahead, y left, z up, metres."""
+
+    def __init__(self) -> None:
+        self.place = np.zeros(3)
+        self.headings = 0  # Turned to the left, of `TURN_RAD` each
+
+    @property
+    def yaw_rad(self) -> float:
+        """The heading, from that of the start."""
+        return self.headings * TURN_RAD
+
+    def displacement(self, action: int) -> NDArray[np.float64]:
+        """Return by how much an action moves the body here, (3,)."""
+        ahead, left, up = DISPLACEMENTS[action]
+        cos, sin = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
+        return np.array([cos * ahead - sin * left, sin * ahead + cos * left, up])
+
+    def add(self, action: int, refused: bool = False) -> None:
+        """Add an action; one that was refused moved nothing."""
+        if not refused:
+            self.place = self.place + self.displacement(action)
+            self.headings += int(TURNS[action])

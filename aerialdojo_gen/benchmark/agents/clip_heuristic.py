@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -12,10 +11,10 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.base.config.sections import ClipConfig
 from aerialdojo_gen.base.errors import AssetError, UsageError
-from aerialdojo_gen.benchmark.agents.base import AgentBase
+from aerialdojo_gen.benchmark.agents.base import AgentBase, Odometer
 from aerialdojo_gen.benchmark.agents.depth_map import free_ahead_m
 from aerialdojo_gen.benchmark.agents.goal import Goal, Observation, Sensors
-from aerialdojo_gen.geometry.motion import DISPLACEMENTS, TURN_RAD, TURNS
+from aerialdojo_gen.geometry.motion import DISPLACEMENTS
 from aerialdojo_gen.pipeline.scoring.clip import ClipScorer, digest
 from aerialdojo_gen.store.schemas import ACTION_NAMES, MOVE_DOWN_1, STOP, TURN_LEFT
 
@@ -80,8 +79,7 @@ class ClipHeuristicAgent(AgentBase):
             self._wanted = self._clip.embed_text(goal.description or goal.target_name)
         self._stop_at = self._stops[goal.modality]
         self._radius_m = goal.rules.radius_m
-        self._x_m = self._y_m = 0.0
-        self._headings = 0
+        self._body = Odometer()
         self._before, self._said = STOP, ""
 
     def answer(self) -> str:
@@ -90,7 +88,7 @@ class ClipHeuristicAgent(AgentBase):
 
     def act(self, observation: Observation) -> int:
         """Compare the views with the goal, choose."""
-        self._reckon(observation)
+        self._body.add(self._before, observation.refused)
         cosines = self._clip.embed_pictures(np.stack([observation.rgb[view] for view in self._views])) @ self._wanted
         self._said = ", ".join(f"{view} {cosine:.3f}" for view, cosine in zip(self._views, cosines, strict=True))
         ranked = [self._views[k] for k in np.argsort(-cosines, kind="stable")]
@@ -98,7 +96,8 @@ class ClipHeuristicAgent(AgentBase):
             return STOP
         towards = self._choose(ranked, observation.depth_m)
         action = self._moves[towards] if towards else TURN_LEFT
-        if observation.refused or max(map(abs, self._after(action))) > self._boundary_m:
+        after = self._body.place + self._body.displacement(action)
+        if observation.refused or np.abs(after[:2]).max() > self._boundary_m:
             action = TURN_LEFT
         self._before = action
         return action
@@ -118,15 +117,3 @@ class ClipHeuristicAgent(AgentBase):
             return True
         metres = float(np.abs(DISPLACEMENTS[self._moves[view]]).sum())
         return metres + self._clearance_m <= free_ahead_m(depth_m, self._sensors, self._radius_m)
-
-    def _reckon(self, observation: Observation) -> None:
-        """Dead reckoning: add what the last action did."""
-        if not observation.refused:
-            self._x_m, self._y_m = self._after(self._before)
-            self._headings += int(TURNS[self._before])
-
-    def _after(self, action: int) -> tuple[float, float]:
-        """Return where an action leads, in the frame of the start pose."""
-        ahead, left, _ = DISPLACEMENTS[action]
-        cos, sin = math.cos(self._headings * TURN_RAD), math.sin(self._headings * TURN_RAD)
-        return self._x_m + cos * ahead - sin * left, self._y_m + sin * ahead + cos * left

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
+from typing import Any
 
 import cv2
 import numpy as np
@@ -35,12 +36,12 @@ class DepthMap:
         """Forget everything: another height has another map."""
         n = 2 * _MIDDLE + 1
         self._cells = np.zeros((n, n), np.uint8)
-        # Told by experience, not by depth: stays when the map is drawn over.
+        # Known by experience, not by depth: stays when the map is drawn over.
         self._barred = np.zeros((n, n), np.uint8)
 
-    def cell(self, x_m: float, y_m: float) -> tuple[int, int]:
-        """Cell of a point, kept inside the map."""
-        i, j = (min(max(round(v / _CELL_M) + _MIDDLE, 0), 2 * _MIDDLE) for v in (x_m, y_m))
+    def cell(self, x_m: Any, y_m: Any) -> tuple[Any, Any]:
+        """Cells of points, kept inside the map."""
+        i, j = (np.clip(np.rint(v / _CELL_M).astype(np.int64) + _MIDDLE, 0, 2 * _MIDDLE) for v in (x_m, y_m))
         return i, j
 
     def point(self, cell: tuple[int, int]) -> tuple[float, float]:
@@ -64,9 +65,7 @@ class DepthMap:
         ahead, left = ahead[where], (np.where(where, ahead, 0.0) * self._slope_left)[where]
         x = x_m + math.cos(heading) * ahead - math.sin(heading) * left
         y = y_m + math.sin(heading) * ahead + math.cos(heading) * left
-        n = 2 * _MIDDLE
-        i = np.clip(np.rint(x / _CELL_M).astype(np.int64) + _MIDDLE, 0, n)
-        j = np.clip(np.rint(y / _CELL_M).astype(np.int64) + _MIDDLE, 0, n)
+        i, j = self.cell(x, y)
         if what == _FREE:
             kept = self._cells[i, j] != _OCCUPIED
             i, j = i[kept], j[kept]

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.base.errors import UsageError
-from aerialdojo_gen.benchmark.agents.base import AgentBase
+from aerialdojo_gen.benchmark.agents.base import AgentBase, Odometer
 from aerialdojo_gen.benchmark.agents.depth_map import DepthMap, free_ahead_m
 from aerialdojo_gen.benchmark.agents.goal import Goal, Observation, Sensors
-from aerialdojo_gen.geometry.motion import DISPLACEMENTS, TURN_RAD, TURNS
+from aerialdojo_gen.geometry.motion import TURN_RAD
 from aerialdojo_gen.store.schemas import ACTION_NAMES, MOVE_UP_1, STOP, TURN_LEFT, TURN_RIGHT
 
 _FORWARD = [(ACTION_NAMES.index(f"MoveForward{m}"), float(m)) for m in (5, 3, 1)]
@@ -41,52 +41,45 @@ class ExplorerAgent(AgentBase):
         self._wanted = None if goal.image is None else thumbnail(goal.image)
         self._radius_m = goal.rules.radius_m
         self._map = DepthMap(self._sensors)
-        self._x_m = self._y_m = 0.0
-        self._headings = 0
+        self._body = Odometer()
         self._before = STOP
         self._way: list[tuple[float, float]] = []
 
     @property
-    def _yaw_rad(self) -> float:
-        return self._headings * TURN_RAD
+    def _xy_m(self) -> tuple[float, float]:
+        x, y, _ = self._body.place.tolist()
+        return x, y
 
     def act(self, observation: Observation) -> int:
         """Observe, update the map, choose."""
-        self._reckon(observation)
-        if observation.remaining_actions == 1 or self._found(observation):
+        if observation.refused:
+            # A fence that no camera sees: taken to stand across the way.
+            (x, y), (dx, dy, _) = self._xy_m, self._body.displacement(self._before).tolist()
+            for aside in np.arange(-8.0, 8.5, 0.5) / math.hypot(dx, dy):
+                self._map.bar(x + dx - aside * dy, y + dy + aside * dx)
+        elif self._before == MOVE_UP_1:
+            self._map.clear()
+        self._body.add(self._before, observation.refused)
+        if observation.remaining_actions == 1 or self._is_goal(observation):
             return STOP
         for view in ("front", "left", "right"):
-            self._map.add(view, observation.depth_m[view], self._x_m, self._y_m, self._yaw_rad)
+            self._map.add(view, observation.depth_m[view], *self._xy_m, self._body.yaw_rad)
         self._before = self._choose(observation.depth_m["front"])
         return self._before
 
-    def _reckon(self, observation: Observation) -> None:
-        """Dead reckoning: add what the last action did."""
-        ahead, left, _ = DISPLACEMENTS[self._before]
-        cos, sin = math.cos(self._yaw_rad), math.sin(self._yaw_rad)
-        dx, dy = cos * ahead - sin * left, sin * ahead + cos * left
-        if observation.refused:
-            # A fence that no camera sees: taken to stand across the way.
-            for aside in np.arange(-8.0, 8.5, 0.5) / math.hypot(dx, dy):
-                self._map.bar(self._x_m + dx - aside * dy, self._y_m + dy + aside * dx)
-            return
-        self._x_m, self._y_m = self._x_m + dx, self._y_m + dy
-        self._headings += int(TURNS[self._before])
-        if self._before == MOVE_UP_1:
-            self._map.clear()
-
-    def _found(self, observation: Observation) -> bool:
+    def _is_goal(self, observation: Observation) -> bool:
         if self._wanted is None or "front" not in observation.rgb:
             return False
         return float((thumbnail(observation.rgb["front"]) * self._wanted).mean()) >= self._likeness
 
     def _choose(self, depth_m: NDArray[np.float32]) -> int:
+        here = self._xy_m
         for _ in range(_REPLANS):
-            way = self._way = self._way or self._map.way_to_frontier(self._x_m, self._y_m)
+            way = self._way = self._way or self._map.way_to_frontier(*here)
             if not way:
                 break
             x, y = way[min(_LOOK_ON, len(way) - 1)]
-            bearing = math.atan2(y - self._y_m, x - self._x_m) - self._yaw_rad
+            bearing = math.atan2(y - here[1], x - here[0]) - self._body.yaw_rad
             turns = round(math.remainder(bearing, 2.0 * math.pi) / TURN_RAD)
             if turns:
                 return TURN_LEFT if turns > 0 else TURN_RIGHT
@@ -103,10 +96,9 @@ class ExplorerAgent(AgentBase):
 
     def _straight_m(self, way: list[tuple[float, float]]) -> float:
         """How far the way goes straight ahead."""
-        cos, sin = math.cos(self._yaw_rad), math.sin(self._yaw_rad)
+        cos, sin = math.cos(self._body.yaw_rad), math.sin(self._body.yaw_rad)
         farthest = 0.0
-        for x, y in way:
-            dx, dy = x - self._x_m, y - self._y_m
+        for dx, dy in (np.array(way) - self._xy_m).tolist():
             if abs(-sin * dx + cos * dy) > 1.0:
                 break
             farthest = max(farthest, cos * dx + sin * dy)

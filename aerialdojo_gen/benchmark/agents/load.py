@@ -35,8 +35,8 @@ BUILT_IN = {
     "constant": f"{_HERE}.simple:ConstantAgent",
     "explorer": f"{_HERE}.explorer:ExplorerAgent",
     "clip": f"{_HERE}.clip_heuristic:ClipHeuristicAgent",
-    "openai": "aerialdojo_gen.benchmark.llm.openai_agent:OpenAIAgent",
-    "anthropic": "aerialdojo_gen.benchmark.llm.anthropic_agent:AnthropicAgent",
+    "openai": "aerialdojo_gen.benchmark.llm.protocols:OpenAIAgent",
+    "anthropic": "aerialdojo_gen.benchmark.llm.protocols:AnthropicAgent",
     "policy": "aerialdojo_gen.learning.policy:Policy",
 }
 _BOOLEANS = {"true": True, "yes": True, "on": True, "1": True, "false": False, "no": False, "off": False, "0": False}

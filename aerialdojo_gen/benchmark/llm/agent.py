@@ -15,7 +15,7 @@ from pydantic import ValidationError
 
 from aerialdojo_gen.base.errors import AerialDojoError, AgentUnavailable, ServiceDown, UsageError
 from aerialdojo_gen.base.explain import explain
-from aerialdojo_gen.base.llm_client.service import Connection
+from aerialdojo_gen.base.llm_client import Connection, Meter
 from aerialdojo_gen.base.pictures import Picture, colour_picture, depth_picture
 from aerialdojo_gen.base.secrets import Secrets
 from aerialdojo_gen.benchmark.agents.base import AgentBase, InvalidAnswer, Usage
@@ -77,11 +77,6 @@ class Reply:
     output_tokens: int | None = None
 
 
-def token_count(value: Any) -> int | None:
-    """Return a service's count of tokens; None where it is no count."""
-    return value if isinstance(value, int) and 0 <= value < _MAX_TOKENS and not isinstance(value, bool) else None
-
-
 class LanguageModelAgent(AgentBase, ABC):
     """Asks a model for every action: all it knows in one message, strictly parsed, with one attempt at repair.
 
@@ -89,7 +84,7 @@ class LanguageModelAgent(AgentBase, ABC):
     stays where it is. That is the fairest of the alternatives: an action guessed at would not be the model's, and
     ending the episode would weigh one slip in 300 steps like a crash.
 
-    Subclasses speak a protocol: they name its package and implement `ask`.
+    Subclasses speak a protocol: they name its package, word a request and read its answer.
     """
 
     package = ""
@@ -107,20 +102,12 @@ class LanguageModelAgent(AgentBase, ABC):
         self.tells_tokens = True
         self._asked = False  # Whether `ask_for` has settled the form
         self.sensors = Sensors(o.views, depth=o.depth, width=o.image_size_px, height=o.image_size_px)
+        self.pace: Callable[[], object] = lambda: None  # Called before each request; waits until one may be sent
         self.service = Connection(
             self.package, o.base_url, o.timeout_s, o.request_retries, secrets=self._secrets, key_variable=o.key_env,
-            model=o.model,
+            model=o.model, pace=lambda: self.pace(),
         )  # fmt: skip
         self._begin()
-
-    @property
-    def pace(self) -> Callable[[], None] | None:
-        """Called before each request; waits until one may be sent."""
-        return self.service.meter.pace
-
-    @pace.setter
-    def pace(self, pace: Callable[[], None] | None) -> None:
-        self.service.meter.pace = pace
 
     def close(self) -> None:
         """Close the connections."""
@@ -131,10 +118,22 @@ class LanguageModelAgent(AgentBase, ABC):
         return dict(self._secrets.options(self.options.model_dump(mode="json") | {"answer": self.form}))
 
     @abstractmethod
-    def ask(
-        self, system: str, messages: Sequence[Message], retries: int | None = None, schema: Schema | None = None
-    ) -> Reply:
-        """Send one request; the answer has the JSON schema, that of an action where None."""
+    async def request(self, client: Any, system: str, messages: Sequence[Message], body: dict[str, Any]) -> Any:
+        """Send a request by the package; `body` adds to what it sends."""
+
+    @abstractmethod
+    def read(self, answer: Any) -> Reply:
+        """Read the service's answer; AgentUnavailable where it is none of the protocol."""
+
+    @abstractmethod
+    def form_of(self, name: str, what: str, schema: Schema) -> dict[str, Any]:
+        """Word, in the form that is settled, that the answer has a JSON schema; a tool is called `name`."""
+
+    def reply(self, text: str, answer: Any, *counts: str) -> Reply:
+        """Make a reply: the text without keys, and the tokens in and out, by their names in the answer's usage."""
+        found = (getattr(getattr(answer, "usage", None), name, None) for name in counts)
+        tokens = (n if type(n) is int and 0 <= n < _MAX_TOKENS else None for n in found)
+        return Reply(self.service.clean(text), *tokens)
 
     def ask_for(self, system: str, text: str, schema: Schema) -> Reply:
         """Ask for something else than an action, in the first form that the service takes."""
@@ -191,9 +190,13 @@ class LanguageModelAgent(AgentBase, ABC):
     def _send(
         self, system: str, messages: Sequence[Message], retries: int | None = None, schema: Schema | None = None
     ) -> Reply:
-        """Ask; what is refused for all requests ends the run."""
+        """Ask, for an action where `schema` is None; what is refused for all requests ends the run."""
+        o, act = self.options, ("act", "Do one action.", self.options.action_set.schema())
+        body = self.form_of(*act if schema is None else ("answer", "Give the answer.", schema)) | o.extra_body
+        # By the body, for a package has dropped the argument: its newest models take no temperature.
+        body |= {} if o.temperature is None else {"temperature": o.temperature}
         try:
-            return self.ask(system, messages, retries, schema)
+            return self.read(self.service.call(lambda client: self.request(client, system, messages, body), retries))
         except UsageError as error:
             variable = self.options.key_env or f"{self.package.upper()}_API_KEY"
             # Not what was asked for is wrong, but what stands behind it: the exit code is 1.
@@ -228,7 +231,7 @@ class LanguageModelAgent(AgentBase, ABC):
         self._seen: deque[tuple[int, Picture]] = deque(maxlen=self.options.history_images)
         self._tokens: list[int | None] = [0, 0]
         self._answer: str | None = None
-        self.service.meter.reset()
+        self.service.meter = Meter()
 
     def act(self, observation: Observation) -> int:
         """Ask for an action."""

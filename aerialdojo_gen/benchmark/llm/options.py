@@ -50,7 +50,7 @@ class Options(BaseModel):
     def _plain_url(cls, url: str | None) -> str | None:
         if url is not None:
             # What it needs is an extra, and prompts are shown without it.
-            from aerialdojo_gen.base.llm_client.service import check_url
+            from aerialdojo_gen.base.llm_client import check_url
 
             check_url(url)
         return url

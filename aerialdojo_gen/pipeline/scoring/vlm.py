@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from aerialdojo_gen.base.errors import Malformed
-from aerialdojo_gen.base.llm_client.service import Connection
+from aerialdojo_gen.base.llm_client import Connection
 from aerialdojo_gen.base.pictures import colour_picture
 from aerialdojo_gen.base.safe_parse import loads_json
 from aerialdojo_gen.pipeline.scoring.base import AnchorView

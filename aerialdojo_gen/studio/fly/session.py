@@ -20,12 +20,9 @@ from aerialdojo_gen.base.secrets import Secrets
 from aerialdojo_gen.benchmark.agents import AgentBase
 from aerialdojo_gen.benchmark.agents.goal import Goal, Observation, Sensors
 from aerialdojo_gen.benchmark.evaluation import Evaluation
-from aerialdojo_gen.benchmark.flight import Flight
 from aerialdojo_gen.benchmark.runner import RunLog
-from aerialdojo_gen.benchmark.tasks import select
 from aerialdojo_gen.benchmark.worker import Finished, RetryPolicy, Worker
 from aerialdojo_gen.rendering.gl import release_context
-from aerialdojo_gen.store.layout import check_run_name
 from aerialdojo_gen.store.root import Where, open_root
 
 _NAME = re.compile(r"[a-z0-9][a-z0-9-]{0,39}")
@@ -54,12 +51,9 @@ class Session(AgentBase):
     def __init__(self, data: Where, evaluation: Evaluation, out: Where | None = None) -> None:
         self._data, log = open_root(data), open_root(data if out is None else out)
         self._evaluation = evaluation
-        self._folder = log.below(f"runs/{check_run_name(evaluation.run)}")
-        self._rows = select(self._data, evaluation.selection)
-        self._run = RunLog(self._data, log, self._folder, evaluation, self._rows)
+        self._run = RunLog(self._data, log, evaluation)
         self.sensors = evaluation.sensors or Sensors()
-        self._flight = Flight(self._data, self.sensors, embodiment=evaluation.embodiment,
-                              renderer=evaluation.renderer, hints=evaluation.hints)  # fmt: skip
+        self._flight = evaluation.flight_of(self, self._data)
         self._goal: Goal | None = None
         self._observation: Observation | None = None
         self._next_scene = ""
@@ -130,7 +124,7 @@ class Session(AgentBase):
     @contextmanager
     def running(self, restart: bool = False) -> Iterator[None]:
         """Hold the run, and fly in a thread of its own until the block ends: a renderer belongs to its thread."""
-        with self._folder.lock():
+        with self._run.folder.lock():
             if restart:
                 self._run.drop()
             self._run.check_settings()
@@ -192,7 +186,7 @@ class Session(AgentBase):
 
     def _count(self) -> None:
         finished, successes = self.counts()
-        self._set(selected=self._rows.num_rows, flown=finished, successes=successes)
+        self._set(selected=self._run.rows.num_rows, flown=finished, successes=successes)
 
     def _set(self, **shown: Any) -> None:
         with self._changed:

@@ -15,7 +15,7 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
 from aerialdojo_gen.base.errors import UsageError
-from aerialdojo_gen.base.pictures import PAGE_JPEG, data_url, encode_jpeg, encode_png
+from aerialdojo_gen.base.pictures import PAGE_JPEG, Picture, encode_jpeg, encode_png
 from aerialdojo_gen.base.terminal import shown_in_page
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store.atomic import atomic_file
@@ -38,8 +38,8 @@ def render_page(task: PicturedTask) -> str:
         map=_to_data_url(lambda axes: charts.draw_map(axes, task, 1.6), 9.6, 6.0),
         side=_to_data_url(lambda axes: charts.draw_side(axes, task, 4.0), 9.6, 2.4, left=0.055),
         profile=_to_data_url(lambda axes: charts.draw_profile(axes, task), 9.6, 2.2, left=0.055, bottom=0.2),
-        reference=None if task.reference is None else data_url(encode_png(task.reference)),
-        frames=[(frame, data_url(encode_jpeg(frame.rgb, PAGE_JPEG))) for frame in task.frames],
+        reference=None if task.reference is None else Picture(encode_png(task.reference)).data_url,
+        frames=[(frame, Picture(encode_jpeg(frame.rgb, PAGE_JPEG)).data_url) for frame in task.frames],
         poses=[
             (k, schemas.ACTION_NAMES[action], *pose)
             for k, (action, pose) in enumerate(zip(route["action"], task.poses.tolist(), strict=True))
@@ -56,7 +56,7 @@ def _to_data_url(
     draw(figure.add_axes((left, bottom, 1.0 - left, 1.0 - bottom - (0.03 if bottom else 0.0))))
     buffer = io.BytesIO()
     figure.savefig(buffer, format="jpeg", pil_kwargs={"quality": 86})
-    return data_url(buffer.getvalue())
+    return Picture(buffer.getvalue()).data_url
 
 
 def write_page(task: PicturedTask, path: Path) -> Path:

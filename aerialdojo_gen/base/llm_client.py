@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import asyncio
+import email.utils
 import importlib
+import json
 import os
+import re
 import threading
 import time
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Mapping
+from dataclasses import dataclass
 from typing import Any, TypeVar
 from urllib.parse import urlsplit
 
@@ -21,7 +25,6 @@ from aerialdojo_gen.base.errors import (
     UsageError,
     no_package,
 )
-from aerialdojo_gen.base.llm_client.http import BodyBoundError, Meter, bounded_client, refusal, retry_after_s
 from aerialdojo_gen.base.secrets import Secrets
 
 # A service may say when to come back; beyond this the runner's own schedule is the better one.
@@ -73,6 +76,7 @@ class Connection:
         secrets: Secrets | None = None,
         key_variable: str | None = None,
         model: str = "",
+        pace: Callable[[], object] = lambda: None,
     ) -> None:
         try:
             self._package = importlib.import_module(package)
@@ -88,6 +92,7 @@ class Connection:
         self._key = api_key(key_variable or f"{package.upper()}_API_KEY", self.base_url if not key_variable else None)
         self._secrets = secrets or Secrets()
         self._timeout_s, self._retries, self._model = timeout_s, retries, model
+        self._pace = pace  # Called before each request; waits until one may be sent
         self.name = self.base_url or _CLIENTS[package]
         self.meter = Meter()
         # Less than the deadline, so that an address where nobody listens is not taken for a slow answer.
@@ -114,8 +119,7 @@ class Connection:
         return retrying(self._once, ask)
 
     def _once(self, ask: Callable[[Any], Awaitable[Result]]) -> Result:
-        if self.meter.pace is not None:
-            self.meter.pace()
+        self._pace()
         began = time.monotonic()
         future = asyncio.run_coroutine_threadsafe(self._within_deadline(ask), self._loop)
         try:
@@ -127,7 +131,7 @@ class Connection:
             failure = AgentUnavailable(message, kind="time-out")
         except BodyBoundError as error:
             # One of the packages wraps what its client raises, the other lets it through.
-            failure = self._bound(error)
+            failure = self.unusable(self.clean(str(error)))
         finally:
             # Ctrl-C leaves the request unfinished.
             future.cancel()
@@ -140,13 +144,10 @@ class Connection:
 
     def not_understood(self, what: str) -> AgentUnavailable:
         """Make the error for an answer that is not what the protocol says."""
-        return self._refused(f"its answer is no {what}: is base_url right?", "malformed answer")
+        return self.unusable(f"its answer is no {what}: is base_url right?")
 
-    def filtered(self) -> AgentUnavailable:
-        """Make the error for an answer that the service's content filter has taken away."""
-        return self._refused("its content filter took the answer away", "content filter")
-
-    def _refused(self, why: str, kind: str) -> AgentUnavailable:
+    def unusable(self, why: str, kind: str = "malformed answer") -> AgentUnavailable:
+        """Make the error for an answer that would be the same if it was asked for again."""
         return AgentUnavailable(f"{self.name}: {why}", kind=kind, again=False)
 
     def clean(self, text: str) -> str:
@@ -162,23 +163,38 @@ class Connection:
             closing = asyncio.run_coroutine_threadsafe(self.client.close(), self._loop)
             closing.add_done_callback(lambda _: self._loop.stop())
 
-    def _bound(self, error: BodyBoundError) -> AgentUnavailable:
-        return self._refused(self.clean(str(error)), "malformed answer")
-
     def _failure(self, error: Any) -> AerialDojoError:
         if isinstance(error, self._package.APIStatusError):
-            body = getattr(error, "body", None)
-            message = self._line(body or error.message)
-            after_s = retry_after_s(error.response.headers)
-            return refusal(error.status_code, body, message, self.name, self._model, after_s)
+            return self._refusal(error.status_code, error)
         cause = error.__cause__ or error
         if isinstance(cause, BodyBoundError):
-            return self._bound(cause)
+            return self.unusable(self.clean(str(cause)))
         message = self._line(str(cause) or type(cause).__name__)
         if type(cause).__name__ in _NO_ROUTE:
             message = _system_error(cause) or message
             return ServiceDown(f"{self.name}: {message}: is the service there, and is base_url right?")
         return AgentUnavailable(f"{self.name}: {message}", kind="connection lost")
+
+    def _refusal(self, status: int, error: Any) -> AerialDojoError:
+        """Make the error for an HTTP status that is none of success."""
+        body = getattr(error, "body", None)
+        text, after_s = self._line(body or error.message), retry_after_s(error.response.headers)
+        message, words = f"{self.name}: HTTP {status}: {text}", f"{_codes(body)} {text}".lower()
+        if status in (401, 402, 403, 407) or 300 <= status < 400 or _ALL_REQUESTS.search(words):
+            return UsageError(message)
+        if status in _RETRYABLE or status >= 500:
+            return AgentUnavailable(message, after_s, kind=_RETRYABLE.get(status, "server error"))
+        model = rf"(?<!\w){re.escape(self._model.lower())}(?!\w)" if self._model else "model_not_found"
+        # A 404 may be the model's or the address's, or that of something in the request.
+        if status == 404 and (re.search(f"{model}|model_not_found", words) or not _PICTURE_WORDS.search(words)):
+            return UsageError(message)
+        if _FILTERED.search(words):
+            kind = "content filter"
+        elif status == 413 or _TOO_LONG.search(words):
+            kind = "context too long"
+        else:
+            kind = "not found" if status == 404 else "bad request"
+        return AgentUnavailable(message, after_s, kind=kind, again=False)
 
     def _line(self, value: Any) -> str:
         if isinstance(value, dict):
@@ -216,3 +232,104 @@ def _wait_s(state: RetryCallState) -> float:
     error = state.outcome.exception() if state.outcome is not None else None
     retry_after = error.retry_after_s if isinstance(error, AgentUnavailable) else None
     return retry_after if retry_after is not None else min(2.0 ** (state.attempt_number - 1), MAX_WAIT_S)
+
+
+MAX_BODY_BYTES = 4 << 20
+
+
+class BodyBoundError(Exception):
+    """A service sent more than it may, or something that is no JSON."""
+
+
+@dataclass
+class Meter:
+    """Counts requests, and the time that they take."""
+
+    requests: int = 0  # Sent, repeated ones too
+    seconds: float = 0.0  # From sending a request to having its answer whole: of all together, and of the longest
+    longest_s: float = 0.0
+
+    def add(self, seconds: float) -> None:
+        """Count a request."""
+        self.requests += 1
+        self.seconds += seconds
+        self.longest_s = max(self.longest_s, seconds)
+
+
+def bounded_client(base: Any, timeout: Any) -> Any:
+    """Make an HTTP client that bounds what it reads, which the client packages do not, and follows no redirect."""
+    # A redirect would carry the key elsewhere.
+
+    class BoundedClient(base):  # type: ignore[misc]  # a class that is known at run time alone
+        async def send(self, request: Any, *, stream: bool = False, **options: Any) -> Any:
+            response = await super().send(request, stream=True, **options)
+            body = await _whole(response)
+            if response.status_code == 200:
+                _check_json(body)
+            framing = ("content-encoding", "content-length", "transfer-encoding")
+            headers = [(k, v) for k, v in response.headers.items() if k.lower() not in framing]
+            return type(response)(response.status_code, headers=headers, content=body, request=request)
+
+    return BoundedClient(timeout=timeout, follow_redirects=False)
+
+
+async def _whole(response: Any) -> bytes:
+    body = bytearray()
+    try:
+        async for chunk in response.aiter_bytes():
+            body += chunk
+            if len(body) > MAX_BODY_BYTES:
+                raise BodyBoundError(f"its answer is larger than {MAX_BODY_BYTES >> 20} MiB")
+    finally:
+        await response.aclose()
+    return bytes(body)
+
+
+def _check_json(body: bytes) -> None:
+    # Here, so that the packages never parse what makes their parser raise: 5,000-digit numbers, deep nesting.
+    try:
+        json.loads(body)
+    except (ValueError, RecursionError):
+        message = body[:200].decode("utf-8", "replace").split("\n", 1)[0].strip()
+        raise BodyBoundError(f"its answer is no JSON: is base_url right? It begins with {message[:80]!r}") from None
+
+
+def retry_after_s(headers: Mapping[str, str]) -> float | None:
+    """Read ``Retry-After``: seconds or an HTTP date; None where there is none that can be read."""
+    value = headers.get("retry-after", "").strip()
+    if not value:
+        return None
+    try:
+        seconds = float(value)
+    except ValueError:
+        try:
+            seconds = email.utils.parsedate_to_datetime(value).timestamp() - time.time()
+        except (ValueError, TypeError, OverflowError):
+            return None
+    return max(0.0, seconds) if seconds < float("inf") else None
+
+
+_RETRYABLE = {408: "time-out", 409: "conflict", 425: "too early", 429: "rate limit"}
+# A wrong or missing key and no money, as no permission and redirects: the key must not go elsewhere.
+_ALL_REQUESTS = re.compile(
+    "insufficient_quota|billing_|credit balance|insufficient credits|insufficient balance|"
+    "api key not valid|api_key_invalid|invalid api key|incorrect api key"
+)
+_FILTERED = re.compile("content_filter|content filter|content_policy|content policy|responsibleai|safety")
+_TOO_LONG = re.compile(
+    "context_length|context length|context window|maximum context|prompt is too long|too many tokens|max_model_len|"
+    "input is too long"
+)
+_PICTURE_WORDS = re.compile("image|picture|media|file")
+
+
+def _codes(body: Any) -> str:
+    """Join the names that an error gives itself: ``code`` and ``type``, at the top and in ``error``."""
+    inner = body.get("error") if isinstance(body, dict) else None
+    return " ".join(
+        str(part[name])
+        for part in (body, inner)
+        if isinstance(part, dict)
+        for name in ("code", "type", "status")
+        if isinstance(part.get(name), str)
+    )

@@ -1,1 +1,0 @@
-"""A client of language models' services: bounded requests, refusals in plain words, pictures."""
