@@ -18,9 +18,8 @@ from aerialdojo_gen.base.cli_context import command
 from aerialdojo_gen.base.errors import AssetError, StoreError
 from aerialdojo_gen.base.pictures import REFERENCE_PNG, decode_rgb, encode_png
 from aerialdojo_gen.exchange import aerialdojo_layout as layout
-from aerialdojo_gen.exchange.actions import words_of
 from aerialdojo_gen.exchange.folder import link_or_copy
-from aerialdojo_gen.exchange.frames import NED
+from aerialdojo_gen.exchange.frames import NED, words_of
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.rendering.backend import choose_renderer, scene_renderer
 from aerialdojo_gen.scenes.context import open_scene

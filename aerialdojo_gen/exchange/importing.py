@@ -18,11 +18,10 @@ from aerialdojo_gen.base.names import unknown
 from aerialdojo_gen.exchange import aerialdojo_reader, readers
 from aerialdojo_gen.exchange.fields import BadField, Fields
 from aerialdojo_gen.exchange.folder import whole_folder_below, write_json
-from aerialdojo_gen.exchange.frames import FRAMES, Frame, frame_named
+from aerialdojo_gen.exchange.frames import FRAMES, Frame
 from aerialdojo_gen.exchange.jsonstream import RECORD_LIMIT, records
-from aerialdojo_gen.exchange.tables import IMPORTED_OBJECTS, IMPORTED_ROUTES, IMPORTED_TASKS, Tables
-from aerialdojo_gen.exchange.task import Context, Task, digest, route_row, task_rows
-from aerialdojo_gen.store.layout import check_scene_name
+from aerialdojo_gen.exchange.task import Context, Tables, Task, digest, route_row, task_rows
+from aerialdojo_gen.store.layout import check_scene_name, is_plain
 from aerialdojo_gen.store.root import Where, open_root
 
 _MAX_NAMED = 1000
@@ -44,7 +43,7 @@ class Report:
     notes: Counter[str] = field(default_factory=Counter)  # Else worth knowing, and of how many records
     rows: dict[str, int] = field(default_factory=dict)
     empty: dict[str, int] = field(default_factory=dict)
-    _errors: array[float] = field(default_factory=lambda: array("d"))
+    errors_m: array[float] = field(default_factory=lambda: array("d"))  # Replay errors of routes
 
     def refuse(self, label: str, row: int, error: BadField) -> str:
         """Count a bad record; returns its line."""
@@ -61,28 +60,22 @@ class Report:
             known = name in self.unmapped or len(self.unmapped) < _MAX_NAMED
             self.unmapped[name if known else "(others)"] += 1
 
-    def replayed(self, error_m: float | None) -> None:
-        """Count a route's replay error."""
-        if error_m is not None:
-            self._errors.append(error_m)
-
     def replay(self) -> dict[str, Any] | None:
         """Summarise the replay errors, metres; None where no record has actions and poses."""
-        if not self._errors:
+        if not self.errors_m:
             return None
-        errors = np.asarray(self._errors)
+        errors = np.asarray(self.errors_m)
         median_m, max_m = (round(float(value), 6) for value in (np.median(errors), errors.max()))
         far = int((errors > _FAR_M).sum())
         return {"routes": len(errors), "median_m": median_m, "max_m": max_m, f"over_{_FAR_M:g}_m": far}
 
     def document(self) -> dict[str, Any]:
         """All of it, for ``import.json``."""
-        counted = {"bad_fields": self.bad_fields, "not_mapped": self.unmapped, "null_columns": self.empty}
-        counted |= {"notes": self.notes}
         return {
             "format": self.format, "frame": self.frame, "files": self.files, "records": self.records,
-            "rows": self.rows, "bad_records": self.n_bad,
-            **{name: dict(sorted(counts.items())) for name, counts in counted.items()}, "replay_error": self.replay(),
+            "rows": self.rows, "bad_records": self.n_bad, "bad_fields": dict(sorted(self.bad_fields.items())),
+            "not_mapped": dict(sorted(self.unmapped.items())), "null_columns": dict(sorted(self.empty.items())),
+            "notes": dict(sorted(self.notes.items())), "replay_error": self.replay(),
         }  # fmt: skip
 
     def lines(self) -> list[str]:
@@ -117,7 +110,7 @@ class Objects:
     def __init__(self) -> None:
         self._numbers: dict[str, dict[object, int]] = {}
         self._rows: dict[tuple[str, int], dict[str, Any]] = {}
-        self._pictures: dict[tuple[str, int], dict[str, Path]] = {}
+        self._pictures: dict[tuple[str, int], dict[str, Path | None]] = {}
         self._owners: dict[str, tuple[str, int]] = {}
 
     def number(self, task: Task) -> int | None:
@@ -134,7 +127,7 @@ class Objects:
         known = task.known
         texts = [i.description for i in task.instances if i.description]
         row = {name: known.get(name) for name in ("mesh_node", "category", "direction", "landmark")}
-        row |= {"name": known.get("target_name"), "description": texts[0] if texts else known.get("description")}
+        row |= {"name": known.get("target_name"), "description": next(iter(texts), known.get("description"))}
         if task.object_m is not None:
             row |= dict(zip(("x_m", "y_m", "z_m"), task.object_m.tolist(), strict=True))
         self._merge(task.scene, number, row)
@@ -159,13 +152,10 @@ class Objects:
     def write(self, tables: Tables) -> None:
         """Write the rows, one an object and picture, by scene and number."""
         for scene, number in sorted(self._rows):
-            empty = dict.fromkeys(IMPORTED_OBJECTS.schema.names)
-            row = empty | self._rows[scene, number] | {"scene": scene, "object_id": number}
-            found = sorted(self._pictures.get((scene, number), {}).items())
-            pictures: list[tuple[str, Path | None]] = [*found] or [("", None)]
-            for name, picture in pictures:
-                data = None if picture is None else picture.read_bytes()
-                tables.add(IMPORTED_OBJECTS, {**row, "reference_image_id": name, "reference_image": data})
+            row = self._rows[scene, number] | {"scene": scene, "object_id": number}
+            for name, picture in sorted(self._pictures.get((scene, number), {"": None}).items()):
+                data = picture and picture.read_bytes()
+                tables.add("objects", {**row, "reference_image_id": name, "reference_image": data})
 
 
 MARKER = "import.json"
@@ -221,7 +211,9 @@ def import_benchmark(
         raise UsageError(f"angles are radians, degrees or mixed, not {options.angles!r}")
     sources = _sources(format_name, files)
     report = Report(format_name, frame.name)
-    root, target = open_root(data), f"imported/{_plain(name or format_name)}"
+    if not is_plain(name or format_name):
+        raise UsageError(f"{name!r} cannot name an import: use letters, digits, _ and - (64 at most)")
+    root, target = open_root(data), f"imported/{name or format_name}"
     with whole_folder_below(root, target, MARKER, force=force) as folder, ExitStack() as stack:
         bad = stack.enter_context((folder / "bad_records.txt").open("w", encoding="utf-8"))
         tables, objects = Tables(folder), Objects()
@@ -243,20 +235,14 @@ def import_benchmark(
 
 
 def _frame(format_name: str, chosen: Format, asked: str | None) -> Frame:
-    if chosen.frame is not None:
-        if asked not in (None, chosen.frame):
-            raise UsageError(f"{format_name} files are {chosen.frame} by their format: leave --frame out")
-        return frame_named(chosen.frame)
-    if asked is None:
+    if chosen.frame and asked not in (None, chosen.frame):
+        raise UsageError(f"{format_name} files are {chosen.frame} by their format: leave --frame out")
+    name = chosen.frame or asked
+    if name is None:
         raise UsageError(f"{format_name} files do not say which way their axes point: --frame {'|'.join(FRAMES)}")
-    return frame_named(asked)
-
-
-def _plain(name: str) -> str:
-    try:
-        return check_scene_name(name)
-    except StoreError:
-        raise UsageError(f"{name!r} cannot name an import: use letters, digits, _ and - (64 at most)") from None
+    if name not in FRAMES:
+        raise UsageError(f"no frame {name!r}: it is one of {', '.join(FRAMES)} (the directions of x, y and z)")
+    return FRAMES[name]
 
 
 def _sources(format_name: str, files: Sequence[Path]) -> list[tuple[str, Path]]:
@@ -265,8 +251,7 @@ def _sources(format_name: str, files: Sequence[Path]) -> list[tuple[str, Path]]:
     for path in files:
         if not path.exists():
             raise UsageError(f"there is no file {path}")
-        expanded = aerialdojo_reader.task_files(path) if format_name == "aerialdojo" else [path]
-        for file in expanded:
+        for file in aerialdojo_reader.task_files(path) if format_name == "aerialdojo" else [path]:
             if not file.is_file():
                 raise UsageError(f"{file} is no file")
             found.setdefault(file.absolute())
@@ -294,7 +279,7 @@ def _tasks(
         for row, value in enumerate(records(path, chosen.key, limit=options.record_limit)):
             report.records += 1
             # Notes count only if the record turns out good.
-            context = Context(path, label, frame, options.angles, pictures, type(report.notes)())
+            context = Context(path, label, frame, options.angles, pictures, Counter())
             try:
                 record = Fields(value)
                 task = read(record, context)
@@ -325,8 +310,8 @@ def _write(task: Task, source: dict[str, Any], tables: Tables, objects: Objects,
         task.known["target_object_id"] = number
         pictures = objects.add(task, number)
     for row in task_rows(task, nav_id, source, pictures):
-        tables.add(IMPORTED_TASKS, row)
+        tables.add("tasks", row)
     if task.has_route_row:
-        tables.add(IMPORTED_ROUTES, route_row(task, nav_id, source))
+        tables.add("routes", route_row(task, nav_id, source))
         if task.route is not None:
-            report.replayed(task.route.replay_error_m)
+            report.errors_m.append(task.route.replay_error_m)

@@ -67,6 +67,20 @@ class _Text:
         self._at += 1
         return found
 
+    def members(self, brackets: str, expected: str) -> Iterator[int]:
+        """Stop before each member of a list or an object, with its number; who goes on has used it."""
+        opening, closing = brackets
+        if self.peek() != opening:
+            raise self.fail(f"expected {expected}")
+        self.take(opening)
+        more, row = self.peek() != closing, 0
+        while more:
+            yield row
+            more, row = self.take(f",{closing}") == ",", row + 1
+        if not row:
+            self.take(closing)
+        self.place = "the end"
+
     def value(self) -> Any:
         """Use the next value, whole."""
         self.peek()
@@ -93,14 +107,11 @@ class _Text:
 
 
 def records(path: Path, key: str | None = None, *, limit: int = RECORD_LIMIT) -> Iterator[Any]:
-    """Read a JSON list a record at a time."""
+    """Read a JSON list a record at a time: the file's own, or the one at a key of its object."""
     try:
         with path.open("rb") as file:
             text = _Text(file, path, limit)
-            if key is None:
-                yield from _list(text)
-            else:
-                yield from _under(text, key)
+            yield from _list(text) if key is None else _under(text, key)
             if text.peek():
                 raise text.fail(f"{text.peek()!r} after the end of the value")
     except OSError as error:
@@ -108,11 +119,8 @@ def records(path: Path, key: str | None = None, *, limit: int = RECORD_LIMIT) ->
 
 
 def _under(text: _Text, key: str) -> Iterator[Any]:
-    if text.peek() != "{":
-        raise text.fail(f"expected an object that has a list {key!r}")
-    text.take("{")
     found = False
-    while text.peek() != "}":
+    for _ in text.members("{}", f"an object that has a list {key!r}"):
         name = text.value()
         text.place = f"key {shown(name)}"
         text.take(":")
@@ -121,29 +129,14 @@ def _under(text: _Text, key: str) -> Iterator[Any]:
             yield from _list(text)
         else:
             text.value()
-        if text.take(",}") == "}":
-            break
-    else:
-        text.take("}")
-    text.place = "the end"
     if not found:
         raise text.fail(f"there is no list {key!r}")
 
 
 def _list(text: _Text) -> Iterator[Any]:
-    if text.peek() != "[":
-        raise text.fail(f"expected a list of records, found {text.peek()!r}")
-    text.take("[")
-    row = 0
-    while text.peek() != "]" or row:
+    for row in text.members("[]", f"a list of records, found {text.peek()!r}"):
         text.place = f"row {row}"
         yield text.value()
-        if text.take(",]") == "]":
-            break
-        row += 1
-    else:
-        text.take("]")
-    text.place = "the end"
 
 
 def small_document(path: Path, *, limit: int = RECORD_LIMIT) -> Any:

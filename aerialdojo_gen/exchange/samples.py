@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -17,7 +17,6 @@ from aerialdojo_gen.benchmark.tasks import Selection, mesh_of, reference_image, 
 from aerialdojo_gen.learning.index import Index, read_index
 from aerialdojo_gen.learning.pictures import Frames, RecordedFrames, RenderedFrames, Source
 from aerialdojo_gen.learning.trajectories import SOURCES, recorded_alone
-from aerialdojo_gen.learning.words import goal_text
 from aerialdojo_gen.rendering.sample import choose_trajectories
 from aerialdojo_gen.store.root import DataRoot
 
@@ -91,15 +90,8 @@ class Part:
 
     def cut(self, trajectories: int, steps: int) -> Part:
         """Keep the first trajectories, and of each the first steps: a sample to measure."""
-        index = self.index.take(np.arange(min(trajectories, len(self.index))))
-        short = [index.actions_of(k)[:steps] for k in range(len(index))]
-        first = np.concatenate([[0], np.cumsum([len(actions) for actions in short])]).astype(np.int64)
-        small = Index(
-            index.scenes, index.roots, index.scene, index.nav_id, np.concatenate(short), first, index.start,
-            index.goal, index.budget, index.goal_columns,
-        )  # fmt: skip
-        n = len(small)
-        return Part(0, small, self.settings[:n], self.splits[:n], self.tasks[:n], self.texts[:n], 0, 0)
+        few = self.index.take(np.arange(min(trajectories, len(self.index))))
+        return replace(self, index=replace(few, routes=[actions[:steps] for actions in few.routes]))
 
 
 def plan_parts(root: DataRoot, options: ExportOptions, frames_a_part: int) -> list[Part]:
@@ -115,9 +107,7 @@ def plan_parts(root: DataRoot, options: ExportOptions, frames_a_part: int) -> li
             mesh_of(root, scene)  # a scene without a mesh is named before the first picture
     else:
         chosen = recorded_alone(chosen, options.sensors, "--source render")
-    texts = [IMAGE_TASK if modalities else goal_text(*said) for said in zip(
-        *(chosen.goal_columns[name] for name in ("target_name", "landmark", "direction", "description")), strict=True
-    )]  # fmt: skip
+    texts = [IMAGE_TASK] * len(chosen) if modalities else chosen.goal_texts
     number = {text: k for k, text in enumerate(dict.fromkeys(texts))}
     parts: list[Part] = []
     for rows in _cuts(chosen, frames_a_part):
@@ -133,11 +123,9 @@ def plan_parts(root: DataRoot, options: ExportOptions, frames_a_part: int) -> li
 def _chosen(index: Index, known: dict[str, dict[str, str]], options: ExportOptions) -> NDArray[np.int64]:
     if not options.limit:
         return np.arange(len(index))
-    by_scene: dict[str, list[dict[str, str]]] = {}
-    for nav_id in index.nav_id:
-        by_scene.setdefault(known[nav_id]["scene"], []).append(known[nav_id])
     taken: set[str] = set()
-    for rows in by_scene.values():
+    for scene in index.scenes:
+        rows = [known[nav_id] for nav_id in index.nav_id if known[nav_id]["scene"] == scene]
         taken.update(choose_trajectories(rows, options.limit, options.seed))
     return np.flatnonzero([nav_id in taken for nav_id in index.nav_id])
 

@@ -36,6 +36,7 @@ def frames_a_part(options: ExportOptions) -> int:
 def write_part(root: DataRoot, part: Part, options: ExportOptions, folder: Path) -> None:
     """Write the shard of a part."""
     labels, sample_frames = Labels(part.index, ()), SampleFrames(root, part, options)
+    kind = "jpg" if options.jpeg_quality else "png"
     # The oldest form of the three has neither times of a finer kind nor names of users: the same bytes everywhere.
     with tarfile.open(folder / _FILE, "w", format=tarfile.USTAR_FORMAT) as tar:
         for k in range(len(part.index)):
@@ -50,14 +51,17 @@ def write_part(root: DataRoot, part: Part, options: ExportOptions, folder: Path)
                 for i in range(len(next(iter(frames.values())))):
                     step = rows[begin + i]
                     key = f"{step['nav_id']}-{step['step']:04d}"
-                    seen = {name: dict(zip(options.sensors.views, of[i], strict=True)) for name, of in frames.items()}
-                    for view, rgb in seen.get("rgb", {}).items():
-                        _add(tar, f"{key}.{view}.{_kind(options)}", _picture(rgb, options))
-                    if "depth_m" in seen:
-                        stored = {view: to_stored(depth_m) for view, depth_m in seen["depth_m"].items()}
-                        _add(tar, f"{key}.depth.npz", _arrays(stored))
+                    images = {
+                        name: dict(zip(options.sensors.views, of[i], strict=True)) for name, of in frames.items()
+                    }
+                    for view, rgb in images.get("rgb", {}).items():
+                        _add(tar, f"{key}.{view}.{kind}", _picture(rgb, options))
+                    if "depth_m" in images:
+                        file = io.BytesIO()
+                        np.savez_compressed(file, **{view: to_stored(of) for view, of in images["depth_m"].items()})
+                        _add(tar, f"{key}.depth.npz", file.getvalue())
                     if goal is not None:
-                        _add(tar, f"{key}.goal.{_kind(options)}", goal)
+                        _add(tar, f"{key}.goal.{kind}", goal)
                     _add(tar, f"{key}.json", json.dumps(step, ensure_ascii=False).encode())
 
 
@@ -65,21 +69,16 @@ def _to_json(labels: Labels, part: Part, k: int, options: ExportOptions) -> list
     """Return the JSON of every step of a trajectory."""
     index = part.index
     n = int(index.steps[k])
-    found = labels.of(np.array([k]), np.arange(n)[None], np.ones((1, n), np.bool_))
+    found = labels.at(k, np.arange(n))
     whole: dict[str, Any] = {
         "nav_id": index.nav_id[k], "scene": part.scene, "split": part.splits[k], "setting": part.settings[k],
         "n_steps": n, "task": part.texts[k],
     }  # fmt: skip
-    told = ["target_name", "landmark", "direction", "description"] if "text" in options.goal else []
-    told += ["reference_image_id", "image_distance_m"] if "image" in options.goal else []
-    whole |= {name: index.goal_columns[name][k] for name in told}
-    names = ("action", "previous_action", "remaining_actions", "odometry")
-    columns = zip(*(found[name][0].tolist() for name in names), strict=True)
-    return [{**whole, "step": step, **dict(zip(names, of, strict=True))} for step, of in enumerate(columns)]
-
-
-def _kind(options: ExportOptions) -> str:
-    return "jpg" if options.jpeg_quality else "png"
+    hints = ["target_name", "landmark", "direction", "description"] if "text" in options.goal else []
+    hints += ["reference_image_id", "image_distance_m"] if "image" in options.goal else []
+    whole |= {name: index.goal_columns[name][k] for name in hints}
+    rows = zip(*(values.tolist() for values in found.values()), strict=True)
+    return [{**whole, "step": step, **dict(zip(found, row, strict=True))} for step, row in enumerate(rows)]
 
 
 def _picture(rgb: NDArray[np.uint8], options: ExportOptions) -> bytes:
@@ -89,12 +88,6 @@ def _picture(rgb: NDArray[np.uint8], options: ExportOptions) -> bytes:
     if not done:
         raise RenderError(f"OpenCV could not compress a picture of {rgb.shape[1]} x {rgb.shape[0]} pixels")
     return bytes(data)
-
-
-def _arrays(arrays: dict[str, NDArray[np.uint16]]) -> bytes:
-    file = io.BytesIO()
-    np.savez_compressed(file, **arrays)  # type: ignore[arg-type]
-    return file.getvalue()
 
 
 def _add(tar: tarfile.TarFile, name: str, content: bytes) -> None:

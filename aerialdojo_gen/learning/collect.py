@@ -6,24 +6,21 @@ import hashlib
 import json
 from collections.abc import Sequence
 from dataclasses import asdict, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from aerialdojo_gen.base.errors import AerialDojoError
-from aerialdojo_gen.benchmark.agents.goal import Sensors
 from aerialdojo_gen.benchmark.tasks import mesh_of
 from aerialdojo_gen.dataset.contents import part_name, release_fingerprint
 from aerialdojo_gen.learning.index import Index
-from aerialdojo_gen.learning.parts import DaggerRound, Exploration, Part, references
+from aerialdojo_gen.learning.parts import Exploration, Part, collect_views, references
 from aerialdojo_gen.learning.steps import Steps, is_written, read_steps
 from aerialdojo_gen.learning.trajectories import sampling_key
 from aerialdojo_gen.pipeline.code_digest import code_of
 from aerialdojo_gen.pipeline.executors import Executor
 from aerialdojo_gen.pipeline.executors.channels import WorkerChannel
 from aerialdojo_gen.pipeline.progress import Reporter
-from aerialdojo_gen.store.root import DataRoot
 
 # Trajectories per part: seconds of work, so that parts finish at about the same time.
 _PART = 64
@@ -31,22 +28,18 @@ _VIEWS_PER_PART = 2000
 _MEMORY_MB = 1500
 
 
-def parts_of(
-    data: DataRoot, index: Index, folder: Path, selection: tuple[tuple[str, ...], tuple[str, ...]], sensors: Sensors,
-    size_px: int, seed: int, renderer: str, dagger_round: DaggerRound | None = None,
-) -> list[Part]:  # fmt: skip
-    """Split trajectories into parts; a part's folder is named by a digest of all that its content depends on."""
+def parts_of(common: Part, index: Index, seed: int) -> list[Part]:
+    """Split trajectories into parts, each in a folder of the common one, named by all that its content depends on."""
     # References do not depend on the network that flies later.
-    modules = ["rendering.gl", "learning.parts", *(["learning.flights"] if dagger_round is not None else [])]
-    code, s, flown = [code_of(f"aerialdojo_gen.{name}").digest for name in modules], sensors, dagger_round
-    facts = [s.views, s.width, s.height, s.fov_deg, s.max_depth_m, size_px, renderer, code,
+    flown = common.dagger_round
+    facts = [*_facts(common, *(["flights"] if flown else [])),
              flown and [flown.sha256, flown.seed, flown.round, flown.teacher_share]]  # fmt: skip
     parts = []
     for number, scene in enumerate(index.scenes):
         rows = np.flatnonzero(index.scene == number)
         # Goal images come from another stage: the same trajectories may have others.
-        shown = data.digest(part_name("release/objects", scene))
-        if dagger_round is None:
+        shown = common.data.digest(part_name("release/objects", scene))
+        if flown is None:
             # In sampling order: with another limit all parts but the last stay the same.
             rows = rows[np.argsort([sampling_key(seed, index.nav_id[k]) for k in rows], kind="stable")]
             shares = [rows[k : k + _PART] for k in range(0, len(rows), _PART)]
@@ -56,34 +49,31 @@ def parts_of(
             shares = np.array_split(rows, -(-len(rows) // _PART))
         for own in shares:
             piece = index.take(own)
-            name = _part_name(scene, [facts, piece.digest, mesh_of(data, scene)[1], shown])
-            parts.append(Part(
-                data, *selection, scene, tuple(piece.nav_id), sensors, size_px, renderer, folder / name, dagger_round,
-            ))  # fmt: skip
+            parts.append(_part(common, scene, [facts, piece.digest, shown], nav_ids=tuple(piece.nav_id)))
     return parts
 
 
-def view_parts(
-    data: DataRoot, scenes: Sequence[str], folder: Path, split: str, target_split: str | None, looks: int, seed: int,
-    like: Part,
-) -> list[Part]:  # fmt: skip
-    """Make parts of extra views; cameras and renderer are those of another part."""
-    code = [code_of(f"aerialdojo_gen.{name}").digest for name in ("rendering.gl", "learning.exploration_views")]
-    s, parts, release = like.sensors, [], release_fingerprint(data)
+def view_parts(common: Part, scenes: Sequence[str], looks: int, seed: int, target_split: str | None) -> list[Part]:
+    """Make parts of extra views."""
+    common = replace(common, settings=())
+    facts, parts = [*_facts(common), release_fingerprint(common.data), common.splits], []
     for scene in scenes:
         for number, begin in enumerate(range(0, looks, _VIEWS_PER_PART)):
             own = Exploration(min(_VIEWS_PER_PART, looks - begin), seed, number, target_split)
-            facts = [s.views, s.width, s.height, s.fov_deg, s.max_depth_m, like.renderer, code, release, split,
-                     mesh_of(data, scene)[1], asdict(own)]  # fmt: skip
-            parts.append(replace(
-                like, splits=(split,), settings=(), scene=scene, nav_ids=(), folder=folder / _part_name(scene, facts),
-                dagger_round=None, exploration=own,
-            ))  # fmt: skip
+            parts.append(_part(common, scene, [facts, asdict(own)], exploration=own))
     return parts
 
 
-def _part_name(scene: str, facts: list[Any]) -> str:
-    return f"{scene}-{hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()[:16]}"
+def _facts(common: Part, *modules: str) -> list[Any]:
+    s, names = common.sensors, ("rendering.gl", *(f"learning.{name}" for name in ("parts", *modules)))
+    code = [code_of(f"aerialdojo_gen.{name}").digest for name in names]
+    return [s.views, s.width, s.height, s.fov_deg, s.max_depth_m, common.renderer, code]
+
+
+def _part(common: Part, scene: str, facts: list[Any], **own: Any) -> Part:
+    text = json.dumps([facts, mesh_of(common.data, scene)[1]], sort_keys=True)
+    name = f"{scene}-{hashlib.sha256(text.encode()).hexdigest()[:16]}"
+    return replace(common, scene=scene, folder=common.folder / name, **own)
 
 
 def collect(parts: Sequence[Part], executor: Executor, reporter: Reporter, what: str) -> list[Steps]:
@@ -103,8 +93,6 @@ def make_part(part: Part, link: WorkerChannel | None = None) -> int:
     """Make one part and write it; return how many trajectories it has."""
     del link
     if part.exploration is not None:
-        from aerialdojo_gen.learning.exploration_views import collect_views
-
         steps = collect_views(part, part.exploration)
     elif part.dagger_round is None:
         steps = references(part)

@@ -16,17 +16,15 @@ from aerialdojo_gen.base.constants import RADIUS_M, SUCCESS_RADIUS_M
 from aerialdojo_gen.benchmark.agents.goal import N_ACTIONS
 from aerialdojo_gen.benchmark.tasks import mesh_of
 from aerialdojo_gen.dataset.episode import Episode
-from aerialdojo_gen.learning import checkpoints
 from aerialdojo_gen.learning.encoding import DeadReckoning
-from aerialdojo_gen.learning.geodesic import blocked_actions
-from aerialdojo_gen.learning.labels import scatter_rows
+from aerialdojo_gen.learning.labels import blocked_at, scatter_rows, to_body_frame
 from aerialdojo_gen.learning.loader import torch_package
-from aerialdojo_gen.learning.parts import DaggerRound, Part, goal_poses, goals_of, offsets, pictures
-from aerialdojo_gen.learning.policy import network_of
+from aerialdojo_gen.learning.parts import DaggerRound, Part, goal_poses, goals_of, pictures
+from aerialdojo_gen.learning.policy import network_of, read_weights
 from aerialdojo_gen.learning.steps import Steps
 from aerialdojo_gen.learning.words import Vocabulary
 from aerialdojo_gen.planning.difficulty import agent_actions
-from aerialdojo_gen.planning.flight_space import FlightSpace, flight_space
+from aerialdojo_gen.planning.flight_space import FlightSpace
 from aerialdojo_gen.planning.planner import Planner
 from aerialdojo_gen.scenes.context import SEVERAL, open_scene
 from aerialdojo_gen.scenes.model import Scene
@@ -70,39 +68,36 @@ class FlownEpisode:
     """One episode under way, and what was written down of it."""
 
     def __init__(
-        self, space: FlightSpace, start: NDArray[np.float64], goal: NDArray[np.float64], budget: int
-    ) -> None:
+        self, space: FlightSpace, start: NDArray[np.float64], goal: NDArray[np.float64], budget: int, most: int,
+        draw: np.random.Generator,
+    ) -> None:  # fmt: skip
         x, y, z, yaw = start.tolist()
-        self.space, self.goal = space, goal
+        self.space, self.goal, self.draw, self._most = space, goal, draw, most
         self.episode = Episode(space, (x, y, z, yaw), (goal[0], goal[1], goal[2]), budget)
         self.reckoning = DeadReckoning()
         # What the teacher would do from here on; empty where that is not known.
         self.way = np.zeros(0, np.int8)
-        self.labels: list[int] = []
-        self.odometry: list[NDArray[np.float32]] = []
-        self.poses: list[NDArray[np.float64]] = []
-        self.blocked: list[NDArray[np.bool_]] = []
-        self.frames: list[NDArray[np.uint8]] = []
+        # By name of an array of `Steps`.
+        self.steps: list[dict[str, Any]] = []
 
     @property
     def pose(self) -> NDArray[np.float64]:
         """x, y, z in metres and yaw in radians, world frame."""
         return np.array([*self.episode.position, self.episode.yaw_rad])
 
-    def note(self, label: int, frame: NDArray[np.uint8], pose: NDArray[np.float64]) -> None:
+    def note(self, frame: NDArray[np.uint8]) -> None:
         """Write down a step before it is flown."""
-        self.labels.append(label)
-        self.odometry.append(self.reckoning.odometry)
-        self.poses.append(pose)
-        collides, refused, _ = blocked_actions(self.space, pose)
-        self.blocked.append((collides | refused)[0])
-        self.frames.append(frame)
+        self.steps.append({
+            "label": int(self.way[0]), "odometry": self.reckoning.odometry, "pose": self.pose,
+            "blocked": blocked_at(self.space, self.pose)[0], "frames": frame,
+        })  # fmt: skip
 
-    def fly(self, chosen: int, label: int) -> bool:
+    def fly(self, chosen: int) -> bool:
         """Fly the policy's action, or the teacher's where that ends it or moves nothing; False when it is over."""
-        if chosen == STOP and self.arrived:
+        if chosen == STOP and self.episode.distance_m <= SUCCESS_RADIUS_M:
             return False
-        if chosen == STOP or self.blocked[-1][chosen]:
+        label = self.steps[-1]["label"]
+        if chosen == STOP or self.steps[-1]["blocked"][chosen]:
             if label == STOP:
                 return False
             chosen = label
@@ -110,12 +105,7 @@ class FlownEpisode:
         # Who does what a route says is still on it; a new search from there would find its rest, or one as good.
         self.way = self.way[1:] if chosen == self.way[0] and not self.episode.refused else self.way[:0]
         self.reckoning.add(chosen, self.episode.refused)
-        return self.episode.termination is None
-
-    @property
-    def arrived(self) -> bool:
-        """Whether a Stop here is a success."""
-        return self.episode.distance_m <= SUCCESS_RADIUS_M
+        return self.episode.termination is None and len(self.steps) < self._most
 
 
 def flights(part: Part, dagger_round: DaggerRound) -> Steps:
@@ -127,13 +117,10 @@ def flights(part: Part, dagger_round: DaggerRound) -> Steps:
     """
     torch = torch_package()
     torch.set_num_threads(1)
-    index = part.index()
-    body = Embodiment()
-    mesh = mesh_of(part.data, part.scene)
-    space = flight_space(*mesh, body.radius_m)
-    context = open_scene(*mesh, SEVERAL)
-    teacher = context.part("teacher", lambda: Teacher(context.scene, body.radius_m), body.radius_m)
-    tensors, about, _ = checkpoints.read(dagger_round.weights)
+    index, space, radius_m = part.index(), part.space, Embodiment().radius_m
+    context = open_scene(*mesh_of(part.data, part.scene), SEVERAL)
+    teacher = context.part("teacher", lambda: Teacher(context.scene, radius_m), radius_m)
+    tensors, about, _ = read_weights(dagger_round.weights)
     network = network_of(about, tensors, str(dagger_round.weights)).eval()
     goals, columns = goal_poses(part, index), goals_of(part, index)
     order = np.lexsort((np.arange(len(index)), *index.goal.T))
@@ -141,12 +128,16 @@ def flights(part: Part, dagger_round: DaggerRound) -> Steps:
     with torch.inference_mode(), teacher.cache_fields():
         for k in range(0, len(order), _PARALLEL_EPISODES):
             rows = order[k : k + _PARALLEL_EPISODES]
-            own = [FlownEpisode(space, index.start[r], goals[r], int(index.budget[r])) for r in rows]
-            most = [int(_TIMES * index.steps[r]) + _MORE for r in rows]
-            draws = [rng.generator(dagger_round.seed, "dagger", dagger_round.round, index.nav_id[r]) for r in rows]
-            shown = np.array([bool(d.random() < 0.5) for d in draws]) & (columns["image"][rows] >= 0)
+            own = [
+                FlownEpisode(
+                    space, index.start[r], goals[r], int(index.budget[r]), int(_TIMES * index.steps[r]) + _MORE,
+                    rng.generator(dagger_round.seed, "dagger", dagger_round.round, index.nav_id[r]),
+                )
+                for r in rows
+            ]  # fmt: skip
+            shown = np.array([bool(one.draw.random() < 0.5) for one in own]) & (columns["image"][rows] >= 0)
             goal = _encoded_goal(torch, network, about.vocabulary, columns, rows, shown)
-            _fly(torch, network, part, teacher, own, most, draws, dagger_round.teacher_share, goal)
+            _fly(torch, network, part, teacher, own, dagger_round.teacher_share, goal)
             flown |= dict(zip(rows.tolist(), own, strict=True))
     return _steps([flown[r] for r in range(len(index))], columns, part)
 
@@ -164,9 +155,8 @@ def _encoded_goal(
 
 
 def _fly(
-    torch: Any, network: Any, part: Part, teacher: Teacher, flown: list[FlownEpisode], most: list[int],
-    draws: list[np.random.Generator], teacher_share: float, goal: Any,
-) -> None:  # fmt: skip
+    torch: Any, network: Any, part: Part, teacher: Teacher, flown: list[FlownEpisode], teacher_share: float, goal: Any
+) -> None:
     going = list(range(len(flown)))
     memory = network.blank(len(flown))
     while going:
@@ -176,38 +166,34 @@ def _fly(
         going = [k for k in going if len(flown[k].way)]
         if not going:
             return
-        poses, labels = [flown[k].pose for k in going], [int(flown[k].way[0]) for k in going]
-        frames = pictures(part, np.array(poses))
-        for i, k in enumerate(going):
-            flown[k].note(labels[i], frames[i], poses[i])
-        last = [flown[k] for k in going]
-        thought, memory[going] = network(
+        own = [flown[k] for k in going]
+        frames = pictures(part, np.array([f.pose for f in own]))
+        for one, frame in zip(own, frames, strict=True):
+            one.note(frame)
+        output, memory[going] = network(
             torch.from_numpy(frames) if part.sensors.views else None,
             goal[going],
-            torch.from_numpy(np.stack([f.odometry[-1] for f in last])[:, None]),
+            torch.from_numpy(np.stack([f.reckoning.odometry for f in own])[:, None]),
             torch.ones((len(going), 1), dtype=torch.bool),
             memory[going],
         )
-        back = torch.from_numpy(np.stack([f.reckoning.back for f in last])[:, None])
-        chosen = thought.actions(back)[:, 0].tolist()
-        left = []
-        for i, k in enumerate(going):
-            action = labels[i] if draws[k].random() < teacher_share else chosen[i]
-            if flown[k].fly(action, labels[i]) and len(flown[k].labels) < most[k]:
-                left.append(k)
-        going = left
+        back = torch.from_numpy(np.stack([f.reckoning.back for f in own])[:, None])
+        chosen = output.actions(back)[:, 0].tolist()
+        by_teacher = [one.draw.random() < teacher_share for one in own]
+        actions = [one.steps[-1]["label"] if by else a for one, by, a in zip(own, by_teacher, chosen, strict=True)]
+        going = [k for k, action in zip(going, actions, strict=True) if flown[k].fly(action)]
 
 
 def _steps(flown: list[FlownEpisode], columns: dict[str, Any], part: Part) -> Steps:
-    counts = [len(f.labels) for f in flown]
-    poses = np.array([pose for f in flown for pose in f.poses]).reshape(-1, 4)
+    def noted(name: str, kind: Any, *shape: int) -> NDArray[Any]:
+        return np.array([step[name] for f in flown for step in f.steps], kind).reshape(sum(counts), *shape)
+
+    counts = [len(f.steps) for f in flown]
+    poses = noted("pose", np.float64, 4)
     goals = np.repeat(np.array([f.goal[:3] for f in flown]).reshape(-1, 3), counts, axis=0)
-    shape = (len(part.sensors.views), part.size_px, part.size_px, 4)
     return Steps(
-        frames=np.array([frame for f in flown for frame in f.frames], np.uint8).reshape(-1, *shape),
-        first=np.concatenate([[0], np.cumsum(counts)]).astype(np.int64),
-        label=np.array([label for f in flown for label in f.labels], np.int64),
-        odometry=np.array([o for f in flown for o in f.odometry], np.float32).reshape(-1, 4),
-        offset=offsets(poses, goals), pose=poses.astype(np.float32),
-        blocked=np.array([one for f in flown for one in f.blocked], np.bool_).reshape(-1, N_ACTIONS), **columns,
+        frames=noted("frames", np.uint8, len(part.sensors.views), *part.image_shape),
+        first=np.cumsum([0, *counts], dtype=np.int64), label=noted("label", np.int64),
+        odometry=noted("odometry", np.float32, 4), offset=to_body_frame(poses, goals).astype(np.float32),
+        pose=poses.astype(np.float32), blocked=noted("blocked", np.bool_, N_ACTIONS), **columns,
     )  # fmt: skip

@@ -1,18 +1,94 @@
-"""Labels of samples, what only teachers and rewards may know, and samples joined to batches."""
+"""Labels of samples, distances along flyable paths, which no agent may know, and samples joined to batches."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from aerialdojo_gen.base.constants import RADIUS_M
 from aerialdojo_gen.benchmark.agents.goal import N_ACTIONS
 from aerialdojo_gen.benchmark.tasks import mesh_of
 from aerialdojo_gen.geometry.frames import wrap_angle_rad
-from aerialdojo_gen.learning.geodesic import geodesic
+from aerialdojo_gen.geometry.motion import DISPLACEMENTS
 from aerialdojo_gen.learning.index import Index
+from aerialdojo_gen.planning.attempt import costs_at
+from aerialdojo_gen.planning.cost_to_go import columns_by_distance, expand_cost, seed_goal
+from aerialdojo_gen.planning.flight_space import FlightSpace, flight_space
+from aerialdojo_gen.planning.preference import NO_PREFERENCE
+from aerialdojo_gen.scenes.context import context_of
+
+Floats = NDArray[np.float64]
+
+
+def blocked_actions(space: FlightSpace, poses: ArrayLike) -> tuple[NDArray[np.bool_], NDArray[np.bool_], Floats]:
+    """For poses (n, 4): whether actions collide or are refused, (n, 16) each, and where they lead, (n, 16, 3)."""
+    p = np.asarray(poses, np.float64).reshape(-1, 4)
+    c, s = np.cos(p[:, 3])[:, None], np.sin(p[:, 3])[:, None]
+    ahead, left, up = DISPLACEMENTS[:N_ACTIONS].T
+    ends = np.stack([p[:, :1] + (c * ahead - s * left), p[:, 1:2] + (s * ahead + c * left), p[:, 2:3] + up], axis=2)
+    collides, refused = np.zeros((2, len(p), N_ACTIONS), np.bool_)
+    moves = np.flatnonzero(DISPLACEMENTS[:N_ACTIONS].any(axis=1)).tolist()
+    for k, here in enumerate(map(tuple, p[:, :3].tolist())):
+        for a in moves:
+            collides[k, a], refused[k, a] = space.motion_outcome(here, tuple(ends[k, a].tolist()))
+    ends[refused] = np.broadcast_to(p[:, None, :3], ends.shape)[refused]
+    return collides, refused, ends
+
+
+def blocked_at(space: FlightSpace, poses: ArrayLike) -> NDArray[np.bool_]:
+    """Blocked actions at poses (n, 4): those that collide or are refused, (n, 16) bool."""
+    collides, refused, _ = blocked_actions(space, poses)
+    return collides | refused
+
+
+# Ways longer than this are not found, metres: the longest tasks have routes of 100 m, and who strays flies farther.
+_FARTHEST_M = 200.0
+# How far from the goal a way over the grid may end: what a reference's Approach flies at most, metres.
+_REACH_M = 1.0
+# Fields that a scene keeps, some ten megabytes each.
+_KEPT = 8
+
+
+class Geodesic:
+    """Lengths of shortest ways to the goals of a scene."""
+
+    def __init__(self, space: FlightSpace) -> None:
+        self._space, self._grid = space, space.grid
+        self._plain = np.zeros(self._grid.moves.shape, np.float32)
+        self._order = columns_by_distance(math.ceil((_FARTHEST_M + 2 * _REACH_M) / self._grid.arrays.cell))
+        self._field = lru_cache(maxsize=_KEPT)(self._make_field)
+
+    def distances_m(self, goal: ArrayLike, points: ArrayLike) -> Floats:
+        """Shortest way lengths (n,), metres in the action metric, from points (n, 3) to a goal; inf for none."""
+        g, p = np.asarray(goal, np.float64), np.asarray(points, np.float64).reshape(-1, 3)
+        found = np.asarray(costs_at(np.ascontiguousarray(p), self._grid.arrays, self._field(*g.tolist())))
+        return np.maximum(found, np.linalg.norm(p - g, axis=1))
+
+    def actions(self, goal: ArrayLike, poses: ArrayLike) -> tuple[NDArray[np.bool_], NDArray[np.bool_], Floats]:
+        """For poses (n, 4), (n, 16) each: whether actions collide or are refused, and the cost-to-go in metres."""
+        collides, refused, ends = blocked_actions(self._space, poses)
+        cost = self.distances_m(goal, ends.reshape(-1, 3)).reshape(-1, N_ACTIONS)
+        return collides, refused, np.where(collides, np.inf, cost)
+
+    def _make_field(self, *goal: float) -> NDArray[np.float32]:
+        grid = self._grid
+        cost = np.full(grid.moves.shape, np.inf, np.float32)
+        seeds = seed_goal(*goal, 0.0, _REACH_M, grid.radius_m, grid.arrays, grid.moves, cost, NO_PREFERENCE)
+        expand_cost(seeds, self._order, _FARTHEST_M, grid.arrays.cell, grid.moves, cost, self._plain)
+        return cost
+
+
+def geodesic(mesh: Path, sha256: str, radius_m: float = RADIUS_M) -> Geodesic:
+    """Return a scene's distances, a part of its context; parameters as for `flight_space`."""
+    space = flight_space(mesh, sha256, radius_m)
+    return context_of(space.scene).part("geodesic", lambda: Geodesic(space), radius_m)
+
 
 PRIVILEGED = ("pose", "goal_distance_m", "actions")
 # In the place of the action before the first one.
@@ -27,43 +103,33 @@ class Labels:
 
     def of(self, rows: NDArray[np.int64], steps: NDArray[np.int64], mask: NDArray[np.bool_]) -> dict[str, Any]:
         """Labels of windows of steps (n, T), by name; 0 where the mask is false."""
-        index = self.index
-        n, window = steps.shape
-        out: dict[str, Any] = {
-            "action": np.zeros((n, window), np.int64),
-            "previous_action": np.zeros((n, window), np.int64),
-            "remaining_actions": np.zeros((n, window), np.int32),
-            "odometry": np.zeros((n, window, 4), np.float32),
-        }
-        if "pose" in self.privileged:
-            out["pose"] = np.zeros((n, window, 4))
-        if "goal_distance_m" in self.privileged:
-            out["goal_distance_m"] = np.zeros((n, window), np.float32)
-        if "actions" in self.privileged:
-            out["action_collides"], out["action_refused"] = np.zeros((2, n, window, N_ACTIONS), np.bool_)
-            out["action_cost_to_go_m"] = np.zeros((n, window, N_ACTIONS), np.float32)
+        out: dict[str, Any] = {}
         for i, k in enumerate(rows.tolist()):
-            here, at = mask[i], steps[i, mask[i]]
-            actions, poses = index.actions_of(k), index.poses_of(k)
-            out["action"][i, here] = actions[at]
-            out["previous_action"][i, here] = np.concatenate([[NO_ACTION], actions[:-1]])[at]
-            out["remaining_actions"][i, here] = index.budget[k] - at
-            out["odometry"][i, here] = odometry(poses)[at]
-            if "pose" in self.privileged:
-                out["pose"][i, here] = poses[at]
-            if self.privileged and self.privileged != ("pose",):
-                self._known(out, i, here, k, poses[at])
+            for name, values in self.at(k, steps[i, mask[i]]).items():
+                if name not in out:
+                    out[name] = np.zeros((*steps.shape, *values.shape[1:]), values.dtype)
+                out[name][i, mask[i]] = values
         return out
 
-    def _known(
-        self, out: dict[str, Any], i: int, here: NDArray[np.bool_], k: int, poses: NDArray[np.float64]
-    ) -> None:  # fmt: skip
-        ways, goal = geodesic(*mesh_of(*self.index.scene_of(k))), self.index.goal[k]
-        if "goal_distance_m" in self.privileged:
-            out["goal_distance_m"][i, here] = ways.distances_m(goal, poses[:, :3])
-        if "actions" in self.privileged:
-            out["action_collides"][i, here], out["action_refused"][i, here], cost = ways.actions(goal, poses)
-            out["action_cost_to_go_m"][i, here] = cost
+    def at(self, k: int, steps: NDArray[np.int64]) -> dict[str, NDArray[Any]]:
+        """Labels of some steps of trajectory k."""
+        actions, poses = self.index.routes[k].astype(np.int64), self.index.poses_of(k)
+        out: dict[str, NDArray[Any]] = {
+            "action": actions[steps],
+            "previous_action": np.concatenate([[NO_ACTION], actions[:-1]])[steps],
+            "remaining_actions": (self.index.budget[k] - steps).astype(np.int32),
+            "odometry": odometry(poses)[steps].astype(np.float32),
+        }
+        if "pose" in self.privileged:
+            out["pose"] = poses[steps]
+        if self.privileged and self.privileged != ("pose",):
+            geodesics, goal = geodesic(*mesh_of(*self.index.sources[k])), self.index.goal[k]
+            if "goal_distance_m" in self.privileged:
+                out["goal_distance_m"] = geodesics.distances_m(goal, poses[steps, :3]).astype(np.float32)
+            if "actions" in self.privileged:
+                out["action_collides"], out["action_refused"], cost = geodesics.actions(goal, poses[steps])
+                out["action_cost_to_go_m"] = cost.astype(np.float32)
+        return out
 
 
 def odometry(poses: NDArray[np.float64]) -> NDArray[np.float64]:

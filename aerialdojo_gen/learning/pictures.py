@@ -14,6 +14,7 @@ import os
 import struct
 import zlib
 from collections.abc import Iterator, Sequence
+from dataclasses import asdict
 from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any, Protocol
@@ -48,11 +49,10 @@ class CachedFrames:
     """Pictures of a source, kept in a folder of `base`, one for each way to make them, that grows to `most_bytes`."""
 
     def __init__(
-        self, source: Source, index: Index, sensors: Sensors, meshes: dict[str, str], base: Path, most_bytes: int,
-        drawn: dict[str, str],
-    ) -> None:  # fmt: skip
-        self._source, self._index, self._sensors, self._meshes = source, index, sensors, meshes
-        self._base, self._most_bytes, self._drawn = base, most_bytes, drawn
+        self, source: Source, index: Index, sensors: Sensors, base: Path, most_bytes: int, kind: str, renderer: str
+    ) -> None:
+        self._source, self._index, self._sensors = source, index, sensors
+        self._base, self._most_bytes, self._kind, self._renderer = base, most_bytes, kind, renderer
         self._full = False
         self._used: int | None = None
         self._since = 0
@@ -60,12 +60,10 @@ class CachedFrames:
     def frames(self, trajectories: NDArray[np.int64], steps: NDArray[np.int64]) -> Frames:
         """Read what is there, draw the rest, and keep what was drawn while there is room; see `Source`."""
         out = empty_frames(self._sensors, len(steps))
-        missing = []
-        for k in np.unique(trajectories):
+        for k in np.unique(trajectories).tolist():
             rows = np.flatnonzero(trajectories == k)
-            if not self._read(int(k), steps[rows], rows, out):
-                missing.append((int(k), rows))
-        for k, rows in missing:
+            if self._read(k, steps[rows], rows, out):
+                continue
             if not self._full and self._room():
                 n = int(self._index.steps[k])
                 whole = self._source.frames(np.full(n, k), np.arange(n))
@@ -73,8 +71,8 @@ class CachedFrames:
                 drawn = take(whole, steps[rows])
             else:
                 drawn = self._source.frames(trajectories[rows], steps[rows])
-            for name, seen in drawn.items():
-                out[name][rows] = seen
+            for name, images in drawn.items():
+                out[name][rows] = images
         return out
 
     @property
@@ -84,23 +82,18 @@ class CachedFrames:
 
     @cached_property
     def _folder(self) -> Path:
-        s, modules = self._sensors, ("bodies", "gl", "world", "reader")
-        facts = {
-            "code": [code_of(f"aerialdojo_gen.rendering.{name}").digest for name in modules],
-            "source": self._drawn["source"],
-            # In the process that reads: to find out which renderer works here is to draw.
-            "renderer": renderer_name(self._drawn["renderer"]), "views": s.views, "rgb": s.rgb, "depth": s.depth,
-            "width": s.width, "height": s.height, "fov_deg": s.fov_deg, "max_depth_m": s.max_depth_m,
-        }  # fmt: skip
+        code = [code_of(f"aerialdojo_gen.rendering.{name}").digest for name in ("bodies", "gl", "world", "reader")]
+        # In the process that reads: to find out which renderer works here is to draw.
+        facts = [code, self._kind, renderer_name(self._renderer), asdict(self._sensors)]
         folder = self._base / hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()[:16]
         make_folder(folder)
         return folder
 
     def _path(self, k: int) -> Path:
         index = self._index
-        flown = hashlib.sha256(index.start[k].tobytes() + index.actions_of(k).tobytes()).hexdigest()[:16]
-        mesh = self._meshes[index.scenes[index.scene[k]]][:16]
-        return self._folder / mesh / f"{index.nav_id[k]}-{flown}.pix"
+        flown = hashlib.sha256(index.start[k].tobytes() + index.routes[k].tobytes()).hexdigest()[:16]
+        _, mesh_sha256 = mesh_of(*index.sources[k])
+        return self._folder / mesh_sha256[:16] / f"{index.nav_id[k]}-{flown}.pix"
 
     def _read(self, k: int, steps: NDArray[np.int64], rows: NDArray[np.int64], out: Frames) -> bool:
         n = int(self._index.steps[k])
@@ -140,8 +133,7 @@ class CachedFrames:
         packed = [self._pack(frames, row) for row in range(int(self._index.steps[k]))]
         starts = np.cumsum([len(_MAGIC) + len(packed) * _ENTRY.size, *(len(p) for p in packed)])
         head = b"".join(_ENTRY.pack(int(at), len(p), zlib.crc32(p)) for at, p in zip(starts, packed, strict=False))
-        path = self._path(k)
-        size = int(starts[-1])
+        path, size = self._path(k), int(starts[-1])
         if self._used is not None and self._used + size > self._most_bytes:
             self._full = True
             return
@@ -169,10 +161,6 @@ def _sizes(folder: Path) -> Iterator[int]:
     for path in folder.glob("*/*.pix"):
         with contextlib.suppress(OSError):
             yield path.stat().st_size
-
-
-# Recordings that are kept open: a trajectory's steps follow each other within a block.
-_OPEN = 16
 
 
 # What the chosen views show at n poses, of "rgb" and "depth_m" those asked for: (n, views, H, W, 3) uint8, sRGB, and
@@ -214,12 +202,12 @@ class RenderedFrames:
     def frames(self, trajectories: NDArray[np.int64], steps: NDArray[np.int64]) -> Frames:
         """Draw; see `Source`."""
         index, sensors = self._index, self._sensors
-        context = open_scene(*mesh_of(*index.scene_of(int(trajectories[0]))), SEVERAL)
+        context = open_scene(*mesh_of(*index.sources[int(trajectories[0])]), SEVERAL)
         poses = {int(k): index.poses_of(int(k)) for k in np.unique(trajectories)}
         at = np.stack([poses[k][s] for k, s in zip(trajectories.tolist(), steps.tolist(), strict=True)])
         rgb, depth_m = draw_bodies(renderer_for(context.scene, self._renderer), sensors.camera, at, sensors.views)
-        seen = {"rgb": rgb} if sensors.rgb else {}
-        return seen | ({"depth_m": clip_depth(depth_m, sensors)} if sensors.depth else {})
+        images = {"rgb": rgb} if sensors.rgb else {}
+        return images | ({"depth_m": clip_depth(depth_m, sensors)} if sensors.depth else {})
 
 
 class RecordedFrames:
@@ -232,7 +220,7 @@ class RecordedFrames:
     def has(self, trajectory: int) -> bool:
         """Whether a trajectory has a recording of all that is asked for."""
         index = self._index
-        (root, scene), nav_id = index.scene_of(trajectory), index.nav_id[trajectory]
+        (root, scene), nav_id = index.sources[trajectory], index.nav_id[trajectory]
         if scene not in self._known:
             self._known[scene] = recorded_frames(root, scene, self._sensors)
         # The recording has a frame a pose of the reference; that of an older version may have other actions.
@@ -255,7 +243,7 @@ class RecordedFrames:
         index, s = self._index, self._sensors
         out = empty_frames(s, len(steps))
         for row, (k, step) in enumerate(zip(trajectories.tolist(), steps.tolist(), strict=True)):
-            root, scene = index.scene_of(k)
+            root, scene = index.sources[k]
             recording = _recording(root, f"media/{scene}/{index.nav_id[k]}")
             for v, view in enumerate(s.views):
                 if s.rgb:
@@ -289,7 +277,8 @@ def recorded_frames(root: DataRoot, scene: str, sensors: Sensors) -> dict[str, i
     return {nav_id: frames[nav_id] for nav_id, kinds in seen.items() if wanted <= kinds}
 
 
-@lru_cache(maxsize=_OPEN)
+# Few are kept open: a trajectory's steps follow each other within a block.
+@lru_cache(maxsize=16)
 def _recording(root: DataRoot, folder: str) -> Recording:
     try:
         recording = read_recording(root.local_copy(folder))

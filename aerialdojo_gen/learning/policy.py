@@ -1,8 +1,12 @@
-"""A trained policy as an agent: ``evaluate --agent policy --option weights=FILE``."""
+"""A trained policy: its weights, in safetensors files whose reading runs nothing, and the agent that flies by them.
+
+``evaluate --agent policy --option weights=FILE`` flies it.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import json
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,16 +14,82 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from aerialdojo_gen.base.cli_context import command
 from aerialdojo_gen.base.errors import StoreError, UsageError, first_line
+from aerialdojo_gen.base.safe_parse import loads_json
 from aerialdojo_gen.benchmark.agents.base import AgentBase
 from aerialdojo_gen.benchmark.agents.goal import N_ACTIONS, Goal, Observation, Sensors
-from aerialdojo_gen.learning import checkpoints
-from aerialdojo_gen.learning.encoding import DeadReckoning, goal_picture, packed
+from aerialdojo_gen.learning.encoding import DeadReckoning, actions_fingerprint, goal_picture, packed
 from aerialdojo_gen.learning.loader import torch_package
 from aerialdojo_gen.learning.recipe import ModelConfig
 from aerialdojo_gen.learning.search import LOST_NATS, Search
 from aerialdojo_gen.learning.words import Vocabulary, goal_text, word_targets
+from aerialdojo_gen.store.atomic import atomic_file, make_folder
 from aerialdojo_gen.store.files import file_digest
+
+_FORMAT = "aerialdojo-gen policy 1"
+
+
+@dataclass(frozen=True)
+class PolicyInfo:
+    """What a policy is made for: it stands in the file beside the weights."""
+
+    shape: dict[str, Any]  # `aerialdojo_gen.learning.network.Shape`
+    vocabulary: Vocabulary
+    sensors: Sensors
+    release: str  # Fingerprint of the release that it learned from
+    actions: str  # Fingerprint of the action set
+    named: tuple[str, ...] = ()  # Words that pictures are searched for
+    scenes: tuple[str, ...] = ()  # Scenes whose tasks it was trained on, in the order of their numbers
+    init: str = ""  # SHA-256 of the weights that its training began with; empty for random ones
+
+    def to_json(self) -> str:
+        """Return it as JSON."""
+        s, v = self.sensors, self.vocabulary
+        return json.dumps({
+            "shape": self.shape, "words": v.words, "length": v.length, "release": self.release,
+            "actions": self.actions, "named": self.named, "scenes": self.scenes, "init": self.init,
+            "sensors": [s.views, s.width, s.height, s.fov_deg, s.max_depth_m],
+        })  # fmt: skip
+
+
+def write_weights(path: Path, tensors: Mapping[str, Any], about: PolicyInfo, state: Mapping[str, Any]) -> None:
+    """Write tensors with what they belong to, and what else there is to know, which must be JSON."""
+    make_folder(path.parent)
+    named = {name: tensor.detach().cpu().contiguous() for name, tensor in tensors.items()}
+    text = {"format": _FORMAT, "about": about.to_json(), "state": json.dumps(state)}
+    with atomic_file(path.parent, path.name) as temporary:
+        torch_package(name="safetensors").torch.save_file(named, str(temporary), metadata=text)
+
+
+def read_weights(path: str | Path) -> tuple[dict[str, Any], PolicyInfo, dict[str, Any]]:
+    """Read what `write_weights` wrote."""
+    torch_package()
+    if not Path(path).is_file():
+        raise UsageError(f"there are no weights {path}: run {command('train', 'imitation')}")
+    try:
+        with torch_package(name="safetensors").safe_open(str(path), framework="pt") as file:
+            metadata = file.metadata() or {}
+            tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 - it is no mapping
+        if metadata.get("format") != _FORMAT:
+            raise ValueError(f"its format is {metadata.get('format')!r}, not {_FORMAT!r}")
+        given, state = loads_json(metadata["about"]), loads_json(metadata["state"])
+        views, width, height, fov_deg, max_depth_m = given["sensors"]
+        sensors = Sensors(tuple(views), bool(views), bool(views), width, height, fov_deg, max_depth_m)
+        words = Vocabulary(given["words"], given["length"])
+        # Weights of an earlier version search for nothing, or do not say where they were trained.
+        named, scenes = (tuple(map(str, given.get(key, ()))) for key in ("named", "scenes"))
+        init = str(given.get("init", ""))
+        about = PolicyInfo(given["shape"], words, sensors, given["release"], given["actions"], named, scenes, init)
+    except Exception as error:  # safetensors has an error of its own, and a header may say anything
+        raise StoreError(f"{path} holds no policy: {first_line(error)}") from None
+    if about.actions != actions_fingerprint():
+        raise UsageError(
+            f"{path} is of another action set: its fingerprint is {about.actions[:16]}, and that of this version is "
+            f"{actions_fingerprint()[:16]}"
+        )
+    return tensors, about, state
+
 
 # Layers whose last output is no word and no scene: it stays the last when words or scenes are added.
 _LAST_STAYS = ("sight.words.", "whereabouts.body.2.")
@@ -32,7 +102,7 @@ class InitialWeights:
     path: str
     sha256: str
     tensors: dict[str, Any]  # By the names that they have in the network
-    about: checkpoints.PolicyInfo
+    about: PolicyInfo
 
     def check_fit(self, sensors: Sensors, model: ModelConfig) -> None:
         """Refuse a recipe with other views or sizes; UsageError names the key."""
@@ -64,7 +134,7 @@ class InitialWeights:
 
 def read_initial_weights(path: str | Path) -> InitialWeights:
     """Read weights of `train`; UsageError or StoreError where there are none to begin with."""
-    tensors, about, _ = checkpoints.read(path)
+    tensors, about, _ = read_weights(path)
     network = network_of(about, tensors, str(path))
     if not about.scenes:
         raise UsageError(
@@ -93,7 +163,7 @@ class Policy(AgentBase):
             raise UsageError("a policy needs weights: --option weights=data/policies/imitation/policy.safetensors")
         # An observation is too little work to be shared, and the cores have a worker each.
         torch.set_num_threads(1)
-        tensors, self._about, _ = checkpoints.read(weights)
+        tensors, self._about, _ = read_weights(weights)
         self._sha256, self._weights = file_digest(Path(weights)), weights
         if sha256 is not None and sha256 != self._sha256:
             raise UsageError(f"{weights} has changed since the run began: give another --run")
@@ -176,7 +246,7 @@ class Policy(AgentBase):
         self._unsearched.clear()
 
 
-def _check_shapes(about: checkpoints.PolicyInfo, shape: Any) -> None:
+def _check_shapes(about: PolicyInfo, shape: Any) -> None:
     """Refuse what the weights cannot take; that shape holds for them has been seen. ValueError says what."""
     sensors, vocabulary = about.sensors, about.vocabulary
     if len(sensors.views) != shape.views or len(vocabulary) != shape.words:
@@ -195,7 +265,7 @@ def _check_shapes(about: checkpoints.PolicyInfo, shape: Any) -> None:
         raise ValueError(f"texts of {vocabulary.length} tokens, {_LONGEST} at most")
 
 
-def network_of(about: checkpoints.PolicyInfo, tensors: dict[str, Any], where: str) -> Any:
+def network_of(about: PolicyInfo, tensors: dict[str, Any], where: str) -> Any:
     """Make the network that weights are of; StoreError where they do not fit it."""
     from aerialdojo_gen.learning.network import Network, Shape
 

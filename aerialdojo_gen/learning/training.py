@@ -22,13 +22,12 @@ from aerialdojo_gen.base.safe_parse import loads_json, read_json
 from aerialdojo_gen.benchmark.agents.goal import Sensors
 from aerialdojo_gen.benchmark.tasks import Selection
 from aerialdojo_gen.dataset.contents import release_fingerprint
-from aerialdojo_gen.learning import checkpoints
+from aerialdojo_gen.learning import policy
 from aerialdojo_gen.learning.collect import collect, parts_of, view_parts
 from aerialdojo_gen.learning.encoding import actions_fingerprint
 from aerialdojo_gen.learning.index import Index, read_index
 from aerialdojo_gen.learning.loader import torch_package
 from aerialdojo_gen.learning.parts import DaggerRound, Part
-from aerialdojo_gen.learning.policy import InitialWeights, joined, read_initial_weights
 from aerialdojo_gen.learning.recipe import Recipe
 from aerialdojo_gen.learning.steps import Pool, Steps
 from aerialdojo_gen.learning.trajectories import sample_evenly
@@ -124,37 +123,38 @@ def train(
     drawn = Path(cache) if cache is not None else base / "policies" / "cache"
     make_folder(folder)
     with open_root(folder).lock():
-        given = None if init is None else read_initial_weights(init)
+        given = None if init is None else policy.read_initial_weights(init)
         own = _Training(root, recipe, folder, drawn, given, device, workers, renderer, reporter or Reporter(True))
         return own.run(restart)
 
 
 class _Training:
     def __init__(
-        self, root: DataRoot, recipe: Recipe, folder: Path, cache: Path, init: InitialWeights | None, device: str,
-        workers: int | None, renderer: str, reporter: Reporter,
+        self, root: DataRoot, recipe: Recipe, folder: Path, cache: Path, init: policy.InitialWeights | None,
+        device: str, workers: int | None, renderer: str, reporter: Reporter,
     ) -> None:  # fmt: skip
         from aerialdojo_gen.learning.imitation import Learner
         from aerialdojo_gen.learning.network import Network, Shape
 
         torch = torch_package("train")
-        self._root, self._recipe, self._folder, self._cache = root, recipe, folder, cache
-        self._init, self._workers, self._renderer, self._reporter = init, workers, renderer, reporter
+        self._recipe, self._folder, self._init = recipe, folder, init
+        self._workers, self._reporter = workers, reporter
         d, m = recipe.data, recipe.model
-        self._sensors = Sensors(d.views, bool(d.views), bool(d.views), d.size_px, d.size_px)
-        self._selection = (Selection((d.split,)).splits, d.settings)
+        sensors = Sensors(d.views, bool(d.views), bool(d.views), d.size_px, d.size_px)
+        # What all parts of the training data have in common.
+        self._common = Part(root, Selection((d.split,)).splits, d.settings, sensors, renderer, cache, d.runs)
         self._index, named = self._read_index()
         vocabulary, scenes, words = Vocabulary.of(self._index.goal_texts), self._index.scenes, named
         if init is not None:
-            init.check_fit(self._sensors, m)
+            init.check_fit(sensors, m)
             vocabulary = init.vocabulary(vocabulary)
-            scenes, words = joined(init.about.scenes, scenes), joined(init.about.named, named)
+            scenes, words = policy.joined(init.about.scenes, scenes), policy.joined(init.about.named, named)
         shape = Shape(
             words=len(vocabulary), views=len(d.views), size_px=d.size_px, scenes=len(scenes), named=len(words),
             **dict(m),
         )  # fmt: skip
-        self._about = checkpoints.PolicyInfo(
-            asdict(shape), vocabulary, self._sensors, release_fingerprint(root), actions_fingerprint(), words, scenes,
+        self._about = policy.PolicyInfo(
+            asdict(shape), vocabulary, sensors, release_fingerprint(root), actions_fingerprint(), words, scenes,
             "" if init is None else init.sha256,
         )  # fmt: skip
         torch.manual_seed(recipe.seed)
@@ -199,21 +199,24 @@ class _Training:
                 f"{len(about.scenes) - scenes:,}; words known: {words:,}, new: {len(about.vocabulary) - words:,}"
             )
         self._tensorboard = _tensorboard(self._folder / "tensorboard")
-        parts = self._collect(self._parts(index, None), "drawing references")
-        self._exploration = self._explore()
+        parts = self._collect(parts_of(self._common, index, recipe.seed), "drawing references")
+        d = recipe.data
+        if d.looks and d.views:
+            views = view_parts(self._common, index.scenes, d.looks, recipe.seed, d.target_split)
+            self._exploration = self._pool(self._collect(views, "rendering extra views"))
         for phase in range(self._first, recipe.dagger.rounds + 1):
             if phase > 0:
                 flown = self._weights(phase - 1)
-                share = recipe.dagger.teacher_share
-                flying = DaggerRound(flown, file_digest(flown), recipe.seed, phase, share)
-                parts += self._collect(self._parts(self._drawn(phase), flying), f"round {phase}: flying")
+                flying = DaggerRound(flown, file_digest(flown), recipe.seed, phase, recipe.dagger.teacher_share)
+                tasks = parts_of(replace(self._common, dagger_round=flying), self._drawn(phase), recipe.seed)
+                parts += self._collect(tasks, f"round {phase}: flying")
             if phase < learner.progress.phase or self._weights(phase).is_file():
                 continue
             if phase > learner.progress.phase:
                 learner.begin(phase)
             self._learn(parts, phase)
             weights = {n: t for n, t in learner.state().items() if n.startswith("network.")}
-            checkpoints.write(self._weights(phase), weights, self._about, asdict(learner.progress))
+            policy.write_weights(self._weights(phase), weights, self._about, asdict(learner.progress))
             self._save_checkpoint()
         last = self._folder / "policy.safetensors"
         # Its bytes, so that they stay the same: who began with these weights, or flies them, goes by their digest.
@@ -225,7 +228,7 @@ class _Training:
     def _read_index(self) -> tuple[Index, tuple[str, ...]]:
         """Read the training trajectories, and the words that images will be searched for."""
         d = self._recipe.data
-        index = read_index(self._root, Selection((d.split,), d.settings, (), d.scenes), d.target_split, d.runs)
+        index = read_index(self._common.data, Selection((d.split,), d.settings, (), d.scenes), d.target_split, d.runs)
         named: tuple[str, ...] = ()
         if d.looks and d.views and self._recipe.sight.epochs:
             # Of all targets, independent of the limit on trajectories.
@@ -244,24 +247,9 @@ class _Training:
         free = np.flatnonzero(~self._held_out(np.array(index.nav_id)))
         return index.take(np.sort(free[np.argsort(np.array(rank, np.uint64)[free], kind="stable")[:want]]))
 
-    def _parts(self, index: Index, dagger_round: DaggerRound | None) -> list[Part]:
-        parts = parts_of(
-            self._root, index, self._cache, self._selection, self._sensors, self._recipe.data.size_px,
-            self._recipe.seed, self._renderer, dagger_round,
-        )  # fmt: skip
-        return [replace(part, runs=self._recipe.data.runs) for part in parts]
-
     def _collect(self, parts: list[Part], what: str) -> list[Steps]:
         with make_executor("local", self._workers) as executor:
             return collect(parts, executor, self._reporter, what)
-
-    def _explore(self) -> Pool | None:
-        d, scenes = self._recipe.data, self._index.scenes
-        if not (d.looks and d.views):
-            return None
-        like = self._parts(self._index, None)[0]
-        parts = view_parts(self._root, scenes, self._cache, d.split, d.target_split, d.looks, self._recipe.seed, like)
-        return self._pool(self._collect(parts, "rendering extra views"))
 
     def _pool(self, parts: list[Steps]) -> Pool:
         return Pool(parts, self._about.scenes, self._about.vocabulary)
@@ -317,13 +305,13 @@ class _Training:
 
     def _save_checkpoint(self) -> None:
         progress = asdict(self._learner.progress)
-        checkpoints.write(self._folder / _CHECKPOINT, self._learner.state(), self._about, progress)
+        policy.write_weights(self._folder / _CHECKPOINT, self._learner.state(), self._about, progress)
         self._kept = time.monotonic()
 
     def _resume(self) -> None:
         path = self._folder / _CHECKPOINT
         if path.is_file():
-            tensors, _, state = checkpoints.read(path)
+            tensors, _, state = policy.read_weights(path)
             self._learner.restore(tensors, state)
         # An epoch in the history but not in the checkpoint is repeated.
         p, file = self._learner.progress, self._folder / _HISTORY

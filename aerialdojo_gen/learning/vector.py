@@ -14,7 +14,7 @@ from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv
 from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.benchmark.env import AerialDojoEnv, make_env
 from aerialdojo_gen.benchmark.tasks import mesh_of
-from aerialdojo_gen.learning.geodesic import geodesic
+from aerialdojo_gen.learning.labels import geodesic
 from aerialdojo_gen.learning.words import Vocabulary, goal_text
 from aerialdojo_gen.store.root import Where, open_root
 from aerialdojo_gen.store.schemas import DIRECTIONS
@@ -29,7 +29,7 @@ def _innermost(env: gymnasium.Env[Any, Any], what: str) -> AerialDojoEnv:
 class ProgressReward(gymnasium.Wrapper[dict[str, Any], np.int64, dict[str, Any], np.int64]):
     """Adds to the reward what an action brings the body nearer to the goal, on ways that it can fly.
 
-    The distance is `aerialdojo_gen.learning.geodesic.Geodesic`'s. With a discount of 1 what is added over an episode
+    The distance is `aerialdojo_gen.learning.labels.Geodesic`'s. With a discount of 1 what is added over an episode
     is the distance at the start less that at the end, times `scale`: a potential, which changes no optimal policy.
 
     Parameters

@@ -9,15 +9,14 @@ from aerialdojo_gen.benchmark.tasks import Selection, mesh_of
 from aerialdojo_gen.dataset.episode import Episode
 from aerialdojo_gen.learning.encoding import DeadReckoning
 from aerialdojo_gen.learning.index import read_index
-from aerialdojo_gen.learning.parts import offsets, pictures
+from aerialdojo_gen.learning.labels import to_body_frame
+from aerialdojo_gen.learning.parts import Part, pictures
+from aerialdojo_gen.learning.policy import read_weights
 from aerialdojo_gen.learning.recipe import Recipe
 from aerialdojo_gen.planning.flight_space import flight_space
 from aerialdojo_gen.store.root import open_root
 
 torch = pytest.importorskip("torch", reason="PyTorch is not installed: it is the extra 'train'")
-
-from aerialdojo_gen.learning import checkpoints  # noqa: E402 - it needs torch
-from aerialdojo_gen.learning.collect import parts_of  # noqa: E402
 
 # The map learns nothing: where the goal is, is told or not known at all.
 RECIPE = Recipe.model_validate({
@@ -35,7 +34,7 @@ def flown(root, net, sensors, index, k, led):
         flight_space(*mesh_of(root, index.scenes[0]), Embodiment().radius_m), tuple(index.start[k].tolist()),
         tuple(index.goal[k].tolist()), int(index.budget[k]),
     )  # fmt: skip
-    (part,) = parts_of(root, index.take(np.array([k])), root.path, (("id_test",), ()), sensors, 32, 0, "gl")
+    part = Part(root, ("id_test",), (), sensors, "gl", root.path, scene=index.scenes[0])
     reckoning, goal, memory = DeadReckoning(), torch.zeros(1, net.shape.features), net.blank(1)
     step = torch.ones((1, 1), dtype=torch.bool)
     while episode.termination is None:
@@ -43,7 +42,7 @@ def flown(root, net, sensors, index, k, led):
         seen = net.features(torch.from_numpy(pictures(part, pose)), goal, step)
         guess, memory = net.whereabouts(seen, goal, torch.from_numpy(reckoning.odometry[None, None]), memory)
         if led:
-            guess = guess.with_goal_offset(torch.from_numpy(offsets(pose, index.goal[k : k + 1]))[None])
+            guess = guess.with_goal_offset(torch.from_numpy(to_body_frame(pose, index.goal[k : k + 1]))[None].float())
         action = int(net.choose(seen, guess).actions(torch.from_numpy(reckoning.back[None, None]))[0, 0])
         episode.step(action)
         reckoning.add(action, episode.refused)
@@ -54,7 +53,7 @@ def flown(root, net, sensors, index, k, led):
 def test_told_where_goals_are_it_flies_there_though_its_map_knows_nothing(smoke, tmp_path):
     root = open_root(smoke)
     policy = train_here(smoke, RECIPE, tmp_path / "out", tmp_path / "cache").policy
-    net, about = network(policy), checkpoints.read(policy)[1]
+    net, about = network(policy), read_weights(policy)[1]
     index = read_index(root, Selection(("id_test",)))
     rows = np.linspace(0, len(index) - 1, min(len(index), 40)).astype(int)
     with torch.inference_mode():

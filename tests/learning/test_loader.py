@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from aerialdojo_gen.base.errors import MissingPackage, StoreError, UsageError
 from aerialdojo_gen.learning import Loader, Trajectories
-from aerialdojo_gen.learning.order import Order
+from aerialdojo_gen.learning.loader import Order
 
 WITHOUT = "PyTorch is not installed: it is the extra 'train'"
 

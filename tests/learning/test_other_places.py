@@ -24,15 +24,14 @@ from aerialdojo_gen.benchmark.scoring import score
 from aerialdojo_gen.benchmark.tasks import Selection
 from aerialdojo_gen.cli import app as cli
 from aerialdojo_gen.learning.index import read_index
+from aerialdojo_gen.learning.policy import Policy, read_weights
+from aerialdojo_gen.learning.search import Search
 from aerialdojo_gen.store.files import file_digest
 from aerialdojo_gen.store.root import open_root
 
 torch = pytest.importorskip("torch", reason="PyTorch is not installed: it is the extra 'train'")
 
-from aerialdojo_gen.learning import checkpoints  # noqa: E402 - it needs torch
-from aerialdojo_gen.learning.localization import UNIT_M  # noqa: E402
-from aerialdojo_gen.learning.policy import Policy  # noqa: E402
-from aerialdojo_gen.learning.search import Search  # noqa: E402
+from aerialdojo_gen.learning.localization import UNIT_M  # noqa: E402 - it needs torch
 
 TEXT = """
 name = "sight"
@@ -91,7 +90,7 @@ def test_patches_are_told_by_the_names_of_what_they_show(smoke, learned):
     rows = [row for row in history(learned.parent) if row["phase"] == -1]
     assert [row["epoch"] for row in rows] == list(range(12))
     assert rows[-1]["accuracy"] > max(0.6, rows[0]["accuracy"] + 0.1)
-    _, about, _ = checkpoints.read(learned)
+    _, about, _ = read_weights(learned)
     index = read_index(open_root(smoke), Selection(("id_train",)))
     said = " ".join(index.goal_columns["target_name"]).lower().split()
     assert about.named
@@ -100,7 +99,7 @@ def test_patches_are_told_by_the_names_of_what_they_show(smoke, learned):
 
 def test_what_is_seen_is_learned_apart_from_all_else(learned, sightless):
     """With it and without it the map and the choice are the same, to the bit."""
-    without, with_it = (checkpoints.read(path)[0] for path in (sightless, learned))
+    without, with_it = (read_weights(path)[0] for path in (sightless, learned))
     assert not any(".sight." in name for name in without)
     assert {name for name in with_it if ".sight." not in name} == set(without)
     assert all(torch.equal(with_it[name], tensor) for name, tensor in without.items())
@@ -111,7 +110,7 @@ def test_killed_while_it_learns_to_see_it_goes_on_and_ends_the_same(smoke, cache
     file, out = tmp_path / "own.toml", tmp_path / "out"
     file.write_text(TEXT)
     kill_at_first_checkpoint(file, smoke, out, cache)
-    assert checkpoints.read(out / "checkpoint.safetensors")[2]["phase"] == -1
+    assert read_weights(out / "checkpoint.safetensors")[2]["phase"] == -1
     assert not (out / "sight.safetensors").exists()
     assert_same_training(learned, train_here(smoke, recipe(), out, cache).policy)
 
@@ -194,7 +193,7 @@ def guess(network, seen, goal):
 
 def test_adapted_weights_begin_as_the_given_ones(learned, adapted):
     """For what both know, the two networks answer alike; what is new stands beside it."""
-    old, new = (checkpoints.read(path)[1] for path in (learned, adapted))
+    old, new = (read_weights(path)[1] for path in (learned, adapted))
     assert old.scenes == ("U_Courtyard_0",)
     assert new.scenes == ("U_Courtyard_0", "U_Courtyard_1")
     n = len(old.vocabulary)
@@ -234,13 +233,13 @@ def test_a_training_goes_on_from_where_the_given_weights_are(smoke, cache, learn
     assert f"begins with {learned}, scenes known: 1, new: 0; words known: " in done.stderr
     first, anew = (next(row for row in history(folder) if row["phase"] == 0) for folder in (out, learned.parent))
     assert first["loss"] < 0.9 * anew["loss"]
-    assert checkpoints.read(out / "policy.safetensors")[1].scenes == ("U_Courtyard_0",)
+    assert read_weights(out / "policy.safetensors")[1].scenes == ("U_Courtyard_0",)
 
 
 def test_what_does_not_fit_is_refused_in_a_line_that_names_it(smoke, cache, learned, tmp_path):
     old = rewritten(learned, tmp_path / "old.safetensors", scenes=())
     cut = rewritten(learned, tmp_path / "cut.safetensors", lacking="choice")
-    named = checkpoints.read(learned)[1].named
+    named = read_weights(learned)[1].named
     wordless = rewritten(learned, tmp_path / "wordless.safetensors", named=named[:-1])
     for init, changed, error, message in (
         (learned, {"model": {"hidden": 48}}, UsageError, r"its \[model\] hidden is 32, and the recipe's is 48"),

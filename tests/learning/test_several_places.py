@@ -33,7 +33,7 @@ def halves(smoke, tmp_path_factory):
 def test_two_directories_are_read_as_the_one_that_has_both(smoke, halves):
     whole, parts = (Trajectories(data, "all", limit=6, **HOW) for data in (smoke, halves))
     assert parts.index.scenes == ("U_Courtyard_0", "U_Courtyard_1")
-    assert [root.url for root in parts.index.roots] == [str(path) for path in reversed(halves)]
+    assert [root.url for root in parts.index.roots.values()] == [str(path) for path in reversed(halves)]
     assert parts.fingerprint == whole.fingerprint
     assert len(parts) == len(whole) > 0
     numbers = range(0, len(whole), max(1, len(whole) // 12))
@@ -77,7 +77,7 @@ def test_worlds_are_made_once_and_read_as_one(worlds_cache):
     assert data.index.scenes == names
     made = {path: path.stat().st_mtime_ns for path in worlds_cache.glob("*/*/data/release/**/*.parquet")}
     folders = make_worlds("U_Alley", num_worlds=2, n_objects=6, folder=worlds_cache)
-    assert [root.url for root in data.index.roots] == [str(folder) for folder in folders]
+    assert [root.url for root in data.index.roots.values()] == [str(folder) for folder in folders]
     assert sorted(k for numbers in data.order(8, seed=2) for k in numbers) == [*range(len(data))]
     batch = data.batch(np.linspace(0, len(data) - 1, 8).astype(int))
     assert {nav_id.rpartition("-")[0] for nav_id in batch["nav_id"]} == set(names)
@@ -85,7 +85,7 @@ def test_worlds_are_made_once_and_read_as_one(worlds_cache):
     assert np.isfinite(batch["goal_distance_m"]).all()
     for name, folder in zip(names, folders, strict=True):
         alone = Trajectories(folder, setting="base", vocabulary=data.vocabulary, **HOW)
-        own = [k for k in range(len(data)) if data.index.scene_of(data.place(k)[0])[1] == name]
+        own = [k for k in range(len(data)) if data.index.sources[data.place(k)[0]][1] == name]
         assert len(own) == len(alone)
         assert alike(data.batch(own[:5]), alone.batch(range(5)))
     assert Trajectories(**asked, setting="base", **HOW).fingerprint == data.fingerprint

@@ -31,6 +31,8 @@ from aerialdojo_gen.learning.collect import collect, parts_of, view_parts
 from aerialdojo_gen.learning.flights import Teacher
 from aerialdojo_gen.learning.index import read_index
 from aerialdojo_gen.learning.labels import odometry
+from aerialdojo_gen.learning.parts import Part
+from aerialdojo_gen.learning.policy import Policy, read_weights
 from aerialdojo_gen.learning.recipe import load_recipe
 from aerialdojo_gen.learning.steps import read_steps
 from aerialdojo_gen.learning.trajectories import sample_evenly
@@ -46,9 +48,7 @@ from aerialdojo_gen.store.schemas.columns import list_of
 
 torch = pytest.importorskip("torch", reason="PyTorch is not installed: it is the extra 'train'")
 
-from aerialdojo_gen.learning import checkpoints  # noqa: E402 - it needs torch
-from aerialdojo_gen.learning.localization import pose_loss  # noqa: E402
-from aerialdojo_gen.learning.policy import Policy  # noqa: E402
+from aerialdojo_gen.learning.localization import pose_loss  # noqa: E402 - it needs torch
 
 POLICY = "policy"
 TEXT = """
@@ -145,7 +145,7 @@ def test_to_restart_is_to_learn_anew(smoke, cache, learned, tmp_path):
     for epochs in (1, 2):
         done = train_here(smoke, recipe(train={"epochs": epochs}), out, cache, restart=True)
         assert [row["epoch"] for row in history(out)] == list(range(epochs))
-        assert checkpoints.read(done.policy)[2]["epoch"] == epochs
+        assert read_weights(done.policy)[2]["epoch"] == epochs
     # A line that was cut short is no line.
     (out / "history.jsonl").write_text((out / "history.jsonl").read_text() + '{"phase": 0, "ep')
     train_here(smoke, recipe(train={"epochs": 2}), out, cache)
@@ -153,7 +153,7 @@ def test_to_restart_is_to_learn_anew(smoke, cache, learned, tmp_path):
 
 
 def parts_by_name(root, index, folder, seed=0):
-    parts = parts_of(root, index, folder, (("id_train",), ()), Sensors(), 32, seed, "gl")
+    parts = parts_of(Part(root, ("id_train",), (), Sensors(width=32, height=32), "gl", folder), index, seed)
     assert sorted(nav_id for part in parts for nav_id in part.nav_ids) == sorted(index.nav_id)
     return {part.folder.name: part for part in parts}
 
@@ -170,11 +170,10 @@ def test_other_pictures_of_the_goals_are_drawn_from_anew(planted, tmp_path):
 
 
 def test_references_and_looks_are_not_drawn_again_where_only_the_network_is_another():
-    for name in ("parts", "exploration_views"):
-        counted = set(code_of(f"aerialdojo_gen.learning.{name}").parts)
-        assert f"aerialdojo_gen.learning.{name}" in counted
-        learned = {"network", "policy", "flights", "imitation", "training"}
-        assert not {f"aerialdojo_gen.learning.{module}" for module in learned} & counted
+    counted = set(code_of("aerialdojo_gen.learning.parts").parts)
+    assert "aerialdojo_gen.learning.parts" in counted
+    learned = {"network", "policy", "flights", "imitation", "training"}
+    assert not {f"aerialdojo_gen.learning.{module}" for module in learned} & counted
     assert "aerialdojo_gen.learning.network" in code_of("aerialdojo_gen.learning.flights").parts
 
 
@@ -206,9 +205,9 @@ def test_a_map_is_learned_from_looks_about_too(smoke, cache, tmp_path):
         thorough = {"epochs": 12, "looks": 128, "batch_steps": 256}
         own = recipe(seed=seed, data={"looks": looks, "limit": None}, model=LARGER, train=thorough)
         policy = train_here(smoke, own, tmp_path / f"{looks}-{seed}", cache).policy
-        net, about = network(policy), checkpoints.read(policy)[1]
-        (like, *_) = parts_of(root, index, tmp_path, (("id_train",), ()), about.sensors, 32, 0, "gl")
-        unseen = view_parts(root, index.scenes, tmp_path, "id_train", None, 200, 7, like)
+        net, about = network(policy), read_weights(policy)[1]
+        common = Part(root, ("id_train",), (), about.sensors, "gl", tmp_path)
+        unseen = view_parts(common, index.scenes, 200, 7, None)
         with make_executor("local", 1) as executor, torch.no_grad():
             (found,) = collect(unseen, executor, Reporter(False), "looking")
             seen = net.encode_pictures(torch.from_numpy(np.array(found.frames)).flatten(0, 1)).reshape(200, -1)
@@ -234,14 +233,14 @@ def test_weights_of_another_action_set_or_release_are_refused_with_both_fingerpr
 
 def test_what_is_no_policy_is_said_in_a_line(tmp_path, learned):
     with pytest.raises(UsageError, match="there are no weights"):
-        checkpoints.read(tmp_path / "none.safetensors")
+        read_weights(tmp_path / "none.safetensors")
     cut = tmp_path / "cut.safetensors"
     for content in (learned.policy.read_bytes()[:-1000], b"{}"):
         cut.write_bytes(content)
         with pytest.raises(StoreError, match="holds no policy"):
-            checkpoints.read(cut)
+            read_weights(cut)
     # A shape beyond its weights, before it takes memory.
-    shape = checkpoints.read(learned.policy)[1].shape
+    shape = read_weights(learned.policy)[1].shape
     with pytest.raises(StoreError, match="holds no policy of this version"):
         Policy(str(rewritten(learned.policy, cut, shape={**shape, "hidden": 10**7})))
     file = tmp_path / "wrong.toml"

@@ -74,7 +74,7 @@ def test_labels_fly_every_trajectory_to_its_goal(smoke, blind):
     assert len(blind) == len(index.actions)
     for k in range(0, len(index), 12):
         batch = blind.batch(range(blind._first[k], blind._first[k + 1]))
-        space = flight_space(*mesh_of(root, index.scene_of(k)[1]), 0.25)
+        space = flight_space(*mesh_of(root, index.sources[k][1]), 0.25)
         episode = Episode(space, tuple(index.start[k]), tuple(index.goal[k]), int(index.budget[k]))
         left = batch["goal_distance_m"][:, 0]
         for i, action in enumerate(batch["action"][:, 0]):
@@ -90,7 +90,7 @@ def test_labels_fly_every_trajectory_to_its_goal(smoke, blind):
         # The distance left falls by no more than what is flown.
         assert left[-1] <= 3.0
         assert (np.diff(left) <= 5.3).all()
-        reckoned = replay([0.0, 0.0, 0.0, 0.0], index.actions_of(k)[:-1])
+        reckoned = replay([0.0, 0.0, 0.0, 0.0], index.routes[k][:-1])
         told = batch["odometry"][:, 0]
         assert told[:, :3] == pytest.approx(reckoned[:, :3], abs=1e-4)
         assert np.cos(told[:, 3] - reckoned[:, 3]) == pytest.approx(1.0, abs=1e-6)
@@ -100,7 +100,7 @@ def test_privileged_columns_are_what_the_environment_does(smoke, blind):
     root, blocked = open_root(smoke), 0
     for number in np.random.default_rng(0).choice(len(blind), 60, replace=False).tolist():
         sample, k = blind[number], blind.place(number)[0]
-        space = flight_space(*mesh_of(root, blind.index.scene_of(k)[1]), 0.25)
+        space = flight_space(*mesh_of(root, blind.index.sources[k][1]), 0.25)
         for action in range(N_ACTIONS):
             episode = Episode(space, tuple(sample["pose"][0]), tuple(blind.index.goal[k]), 5)
             episode.step(action)
