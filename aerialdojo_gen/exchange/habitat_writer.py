@@ -38,10 +38,8 @@ LOST: Mapping[str, Sequence[str]] = {
 
 def categories_of(data: DataRoot, scenes: Sequence[str]) -> dict[str, int]:
     """Number the categories of the scenes' objects, by name."""
-    found: set[str] = set()
-    for scene in scenes:
-        found.update(store.read_scene(data, "release/objects", scene, ["category"])["category"].to_pylist())
-    return {name: k for k, name in enumerate(sorted(found))}
+    columns = (store.read_scene(data, "release/objects", scene, ["category"])["category"] for scene in scenes)
+    return {name: k for k, name in enumerate(sorted({name for column in columns for name in column.to_pylist()}))}
 
 
 def write_index(root: Path, categories: Mapping[str, int]) -> None:

@@ -60,12 +60,11 @@ class Estimate:
     def __str__(self) -> str:
         """Two lines for people."""
         size = f"{self.size_bytes / 1e9:.1f} GB" if self.size_bytes >= 1e9 else f"{self.size_bytes / 1e6:.0f} MB"
-        processes = "worker" if self.workers == 1 else "workers"
         each = 1e3 * self.cpu_s / self.frames
         return (
             f"{self.trajectories:,} trajectories, {self.frames:,} frames (measured on {self.measured}: {each:.1f} ms "
-            f"CPU, {self.size_bytes / self.frames / 1e3:.1f} kB a frame)\n"
-            f"about {duration(self.wall_s)} with {self.workers} {processes} on idle cores, {size} on disk"
+            f"CPU, {self.size_bytes / self.frames / 1e3:.1f} kB a frame)\nabout {duration(self.wall_s)} with "
+            f"{self.workers} worker{'s' * (self.workers != 1)} on idle cores, {size} on disk"
         )
 
 
@@ -80,10 +79,8 @@ def export_for_learning(
     reporter: Reporter | None = None,
 ) -> ExportResult:
     """Write trajectories with what the body sees on them, as a data set for training."""
-    writer = _writer(format_name, options)
-    progress = reporter or Reporter(quiet=True)
+    writer, root, progress = _writer(format_name, options), open_root(data), reporter or Reporter(quiet=True)
     check_target(out, MARKER, force=force)
-    root = open_root(data)
     parts = plan_parts(root, options, writer.frames_a_part(options))
     unfinished = PartialExport(out, _request(format_name, root, options, parts))
     with unfinished.locked():
@@ -97,11 +94,11 @@ def export_for_learning(
                     raise outcome
                 bar.advance(frames=outcome)
         with whole_folder(out, MARKER, force=force) as folder:
-            made = [unfinished.part(part.number) for part in parts]
-            counts = {"scenes": len({part.scene for part in parts})} | writer.finish(parts, options, made, folder)
+            scenes, made = sorted({part.scene for part in parts}), [unfinished.part(part.number) for part in parts]
+            counts = {"scenes": len(scenes)} | writer.finish(parts, options, made, folder)
             write_marker(
-                folder, format_name, FRAME, scenes=sorted({part.scene for part in parts}), counts=counts,
-                wanted=_requested(options), actions=dict(enumerate(ACTION_NAMES[:16])), lost=LOST,
+                folder, format_name, FRAME, scenes=scenes, counts=counts, wanted=_requested(options),
+                actions=dict(enumerate(ACTION_NAMES[:16])), lost=LOST,
             )  # fmt: skip
         shutil.rmtree(unfinished.folder, ignore_errors=True)
     return ExportResult(counts, len(parts), len(parts) - len(left))
@@ -111,8 +108,7 @@ def estimate_for_learning(
     format_name: str, data: Where, options: ExportOptions, workers: int | None = None
 ) -> Estimate:  # fmt: skip
     """Measure a few trajectories and say what all of them will take; nothing is written."""
-    writer = _writer(format_name, options)
-    root = open_root(data)
+    writer, root = _writer(format_name, options), open_root(data)
     parts = plan_parts(root, options, writer.frames_a_part(options))
     drawn = sorted(parts, key=lambda part: rng.rank(options.seed, "estimate", part.scene))[:_MEASURED_PARTS]
     measured = size = 0

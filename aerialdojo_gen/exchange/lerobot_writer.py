@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import json
+import math
 from contextlib import ExitStack
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
+import av
 import cv2
 import numpy as np
 import pyarrow as pa
@@ -14,17 +17,8 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.exchange.folder import link_or_copy, write_json
 from aerialdojo_gen.exchange.samples import ExportOptions, Part, SampleFrames
-from aerialdojo_gen.exchange.video_clips import (
-    DEPTH_CODES,
-    DEPTH_MIN_M,
-    DEPTH_SHIFT_M,
-    KEY_EVERY,
-    Clip,
-    depth_codes,
-    depths_of_codes_m,
-)
 from aerialdojo_gen.geometry.motion import DISPLACEMENTS, TURN_RAD
-from aerialdojo_gen.learning.labels import Labels
+from aerialdojo_gen.learning.labels import labels_at
 from aerialdojo_gen.store.parquet_files import read_file, write_file
 from aerialdojo_gen.store.root import DataRoot
 from aerialdojo_gen.store.schemas import STOP, TURN_LEFT, TURN_RIGHT
@@ -111,6 +105,74 @@ def _video(options: ExportOptions, kind: str) -> dict[str, Any]:
     return {"dtype": "video", "shape": [s.height, s.width, channels], "names": names, "info": info}
 
 
+# Frames are read in any order: every second one is a key frame, as in LeRobot's own videos.
+KEY_EVERY = 2
+QP = 20
+DEPTH_CODES = 4096
+# Metres, of LeRobot's logarithmic steps: code 0 is 0 m, which is "nothing within range" here.
+DEPTH_MIN_M, DEPTH_SHIFT_M = 0.0, 3.5
+
+_OPTIONS = {
+    # A constant quantiser, and nothing that is decided by floating-point numbers: their sums depend on the processor.
+    "rgb": ("libx264", "yuv420p", {
+        "g": str(KEY_EVERY), "bf": "0", "qp": str(QP), "preset": "veryfast", "flags": "+bitexact+cgop",
+        "x264-params": "aq-mode=0:mbtree=0:weightp=0:rc-lookahead=0:scenecut=0:cpu-independent=1",
+    }),
+    # One thread and no pool: the bytes must not depend on the machine's cores.
+    "depth": ("libx265", "gray12le", {
+        "g": str(KEY_EVERY), "preset": "ultrafast", "flags": "+bitexact+cgop",
+        "x265-params": "lossless=1:bframes=0:pools=none:frame-threads=1:no-info=1:log-level=none",
+    }),
+}  # fmt: skip
+
+
+class Clip:
+    """Writes a video frame by frame, at even intervals; a context manager."""
+
+    def __init__(self, path: Path, kind: str, width: int, height: int, fps: int) -> None:
+        codec, pixels, options = _OPTIONS[kind]
+        # Without bitexact the muxer writes the library's version into every file.
+        self._container = av.open(str(path), "w", format="mp4", options={"fflags": "+bitexact"})
+        stream: Any = self._container.add_stream(codec, rate=Fraction(fps), options=options)
+        stream.width, stream.height, stream.pix_fmt = width, height, pixels
+        stream.codec_context.thread_count = 1
+        self._stream, self._format = stream, "rgb24" if kind == "rgb" else pixels
+
+    def write(self, frame: NDArray[Any]) -> None:
+        """Append a frame."""
+        picture = av.VideoFrame.from_ndarray(np.ascontiguousarray(frame), format=self._format)
+        for packet in self._stream.encode(picture):
+            self._container.mux(packet)
+
+    def __enter__(self) -> Clip:
+        """Return itself."""
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        """Finish the file, or only close it where the block failed."""
+        if kind is None:
+            for packet in self._stream.encode():
+                self._container.mux(packet)
+        self._container.close()
+
+
+def depth_codes(depth_m: NDArray[np.float32], most_m: float) -> NDArray[np.uint16]:
+    """Depth in metres, up to `most_m`, as LeRobot's logarithmic 12-bit codes; the error is at most half a step."""
+    low, span = math.log(DEPTH_MIN_M + DEPTH_SHIFT_M), _span(most_m)
+    scaled = (np.log(depth_m + np.float32(DEPTH_SHIFT_M)) - np.float32(low)) * np.float32((DEPTH_CODES - 1) / span)
+    return np.rint(scaled).clip(0, DEPTH_CODES - 1).astype(np.uint16)
+
+
+def depths_of_codes_m(most_m: float) -> NDArray[np.float64]:
+    """Return the depths that codes stand for, (4096,) float64, metres."""
+    steps = np.arange(DEPTH_CODES) * (_span(most_m) / (DEPTH_CODES - 1))
+    return np.clip(np.exp(steps + math.log(DEPTH_MIN_M + DEPTH_SHIFT_M)) - DEPTH_SHIFT_M, DEPTH_MIN_M, most_m)
+
+
+def _span(most_m: float) -> float:
+    return math.log(most_m + DEPTH_SHIFT_M) - math.log(DEPTH_MIN_M + DEPTH_SHIFT_M)
+
+
 QUANTILES = {"q01": 0.01, "q10": 0.10, "q50": 0.50, "q90": 0.90, "q99": 0.99}
 
 Stats = dict[str, list[Any]]
@@ -153,7 +215,7 @@ def frames_a_part(options: ExportOptions) -> int:
 
 def write_part(root: DataRoot, part: Part, options: ExportOptions, folder: Path) -> None:
     """Write the files of a part: its data, its videos, and ``part.json`` with what is counted of them."""
-    labels, sums = Labels(part.index, ()), _no_counts(options)
+    sums = _no_counts(options)
     frames: list[dict[str, NDArray[Any]]] = []
     episodes: list[dict[str, Stats]] = []
     with ExitStack() as stack:
@@ -164,7 +226,7 @@ def write_part(root: DataRoot, part: Part, options: ExportOptions, folder: Path)
         }
         sample_frames = SampleFrames(root, part, options)
         for k in range(len(part.index)):
-            frames.append(_columns(labels, part, k))
+            frames.append(_columns(part, k))
             counts = _write_videos(sample_frames, k, options, clips, part)
             episodes.append({name: row_stats(values) for name, values in frames[-1].items()})
             episodes[-1] |= _describe_counts(counts, options, int(part.index.steps[k]))
@@ -181,10 +243,10 @@ def _no_counts(options: ExportOptions) -> Counts:
     return {key: np.zeros(shapes[kind], np.int64) for key, kind in video_kinds(options).items()}
 
 
-def _columns(labels: Labels, part: Part, k: int) -> dict[str, NDArray[Any]]:
+def _columns(part: Part, k: int) -> dict[str, NDArray[Any]]:
     n = int(part.index.steps[k])
     steps = np.arange(n)
-    found = labels.at(k, steps)
+    found = labels_at(part.index, k, steps)
     return {
         "observation.state": np.column_stack([found["odometry"], found["remaining_actions"]]).astype(np.float32),
         "action": OF_ACTION[found["action"]],

@@ -16,7 +16,7 @@ from aerialdojo_gen.base.errors import RenderError, StoreError, brief
 from aerialdojo_gen.base.pictures import FRAME_PNG, encode_png
 from aerialdojo_gen.exchange.folder import link_or_copy, write_json
 from aerialdojo_gen.exchange.samples import ExportOptions, Part, SampleFrames
-from aerialdojo_gen.learning.labels import Labels
+from aerialdojo_gen.learning.labels import labels_at
 from aerialdojo_gen.rendering.codecs import to_stored
 from aerialdojo_gen.store.layout import is_plain
 from aerialdojo_gen.store.root import DataRoot
@@ -35,7 +35,7 @@ def frames_a_part(options: ExportOptions) -> int:
 
 def write_part(root: DataRoot, part: Part, options: ExportOptions, folder: Path) -> None:
     """Write the shard of a part."""
-    labels, sample_frames = Labels(part.index, ()), SampleFrames(root, part, options)
+    sample_frames = SampleFrames(root, part, options)
     kind = "jpg" if options.jpeg_quality else "png"
     # The oldest form of the three has neither times of a finer kind nor names of users: the same bytes everywhere.
     with tarfile.open(folder / _FILE, "w", format=tarfile.USTAR_FORMAT) as tar:
@@ -45,7 +45,7 @@ def write_part(root: DataRoot, part: Part, options: ExportOptions, folder: Path)
                 raise StoreError(
                     f"routes of {part.scene} in {root}: nav_id {brief(repr(name), 60)} cannot name a file"
                 )
-            rows = _to_json(labels, part, k, options)
+            rows = _to_json(part, k, options)
             goal = _picture(sample_frames.goal(k), options) if "image" in options.goal else None
             for begin, frames in sample_frames.frames(k):
                 for i in range(len(next(iter(frames.values())))):
@@ -65,11 +65,11 @@ def write_part(root: DataRoot, part: Part, options: ExportOptions, folder: Path)
                     _add(tar, f"{key}.json", json.dumps(step, ensure_ascii=False).encode())
 
 
-def _to_json(labels: Labels, part: Part, k: int, options: ExportOptions) -> list[dict[str, Any]]:
+def _to_json(part: Part, k: int, options: ExportOptions) -> list[dict[str, Any]]:
     """Return the JSON of every step of a trajectory."""
     index = part.index
     n = int(index.steps[k])
-    found = labels.at(k, np.arange(n))
+    found = labels_at(index, k, np.arange(n))
     whole: dict[str, Any] = {
         "nav_id": index.nav_id[k], "scene": part.scene, "split": part.splits[k], "setting": part.settings[k],
         "n_steps": n, "task": part.texts[k],

@@ -6,7 +6,7 @@ import math
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,12 +44,14 @@ class Progress:
 Assessment = dict[str, float | None]
 
 
-@dataclass(frozen=True)
-class TrainingLog:
+class TrainingLog(Protocol):
     """Receives a training's progress; loss and accuracy are of choices given the goal's place."""
 
-    on_batch: Callable[[int, int, float, float], None]  # Batches done and in all, loss, accuracy
-    on_epoch: Callable[[dict[str, Any], float], None]  # The epoch's line of the history, and seconds left
+    def on_batch(self, done: int, total: int, loss: float, accuracy: float) -> None:
+        """After so many batches of all."""
+
+    def on_epoch(self, row: dict[str, Any], epochs: int, left_s: float) -> None:
+        """After an epoch: its line of the history, how many epochs there are, and seconds left."""
 
 
 def epoch_batches(
@@ -182,7 +184,7 @@ class Learner:
             mean_loss, accuracy = (value / max(p.sums[2], 1.0) for value in p.sums[:2])
             row: dict[str, Any] = {"phase": p.phase, "epoch": p.epoch, "loss": mean_loss, "accuracy": accuracy}
             p.epoch, p.batch, p.sums = p.epoch + 1, 0, [0.0, 0.0, 0.0]
-            log.on_epoch(row | {"kept_back": assess()}, left_s)
+            log.on_epoch(row | {"kept_back": assess()}, epochs, left_s)
 
     def assess(self, pool: Pool, frames: Any, chosen: NDArray[np.bool_]) -> Assessment | None:
         """See how well the network does on some episodes; None without any."""

@@ -95,41 +95,27 @@ PRIVILEGED = ("pose", "goal_distance_m", "actions")
 NO_ACTION = N_ACTIONS
 
 
-class Labels:
-    """Labels of a selection's trajectories."""
-
-    def __init__(self, index: Index, privileged: tuple[str, ...]) -> None:
-        self.index, self.privileged = index, privileged
-
-    def of(self, rows: NDArray[np.int64], steps: NDArray[np.int64], mask: NDArray[np.bool_]) -> dict[str, Any]:
-        """Labels of windows of steps (n, T), by name; 0 where the mask is false."""
-        out: dict[str, Any] = {}
-        for i, k in enumerate(rows.tolist()):
-            for name, values in self.at(k, steps[i, mask[i]]).items():
-                if name not in out:
-                    out[name] = np.zeros((*steps.shape, *values.shape[1:]), values.dtype)
-                out[name][i, mask[i]] = values
-        return out
-
-    def at(self, k: int, steps: NDArray[np.int64]) -> dict[str, NDArray[Any]]:
-        """Labels of some steps of trajectory k."""
-        actions, poses = self.index.routes[k].astype(np.int64), self.index.poses_of(k)
-        out: dict[str, NDArray[Any]] = {
-            "action": actions[steps],
-            "previous_action": np.concatenate([[NO_ACTION], actions[:-1]])[steps],
-            "remaining_actions": (self.index.budget[k] - steps).astype(np.int32),
-            "odometry": odometry(poses)[steps].astype(np.float32),
-        }
-        if "pose" in self.privileged:
-            out["pose"] = poses[steps]
-        if self.privileged and self.privileged != ("pose",):
-            geodesics, goal = geodesic(*mesh_of(*self.index.sources[k])), self.index.goal[k]
-            if "goal_distance_m" in self.privileged:
-                out["goal_distance_m"] = geodesics.distances_m(goal, poses[steps, :3]).astype(np.float32)
-            if "actions" in self.privileged:
-                out["action_collides"], out["action_refused"], cost = geodesics.actions(goal, poses[steps])
-                out["action_cost_to_go_m"] = cost.astype(np.float32)
-        return out
+def labels_at(
+    index: Index, k: int, steps: NDArray[np.int64], privileged: Sequence[str] = ()
+) -> dict[str, NDArray[Any]]:
+    """Labels of some steps of trajectory k, by name: arrays that lead with the step."""
+    actions, poses = index.routes[k].astype(np.int64), index.poses_of(k)
+    out: dict[str, NDArray[Any]] = {
+        "action": actions[steps],
+        "previous_action": np.concatenate([[NO_ACTION], actions[:-1]])[steps],
+        "remaining_actions": (index.budget[k] - steps).astype(np.int32),
+        "odometry": odometry(poses)[steps].astype(np.float32),
+    }
+    if "pose" in privileged:
+        out["pose"] = poses[steps]
+    if {"goal_distance_m", "actions"} & {*privileged}:
+        geodesics, goal = geodesic(*mesh_of(*index.sources[k])), index.goal[k]
+        if "goal_distance_m" in privileged:
+            out["goal_distance_m"] = geodesics.distances_m(goal, poses[steps, :3]).astype(np.float32)
+        if "actions" in privileged:
+            out["action_collides"], out["action_refused"], cost = geodesics.actions(goal, poses[steps])
+            out["action_cost_to_go_m"] = cost.astype(np.float32)
+    return out
 
 
 def odometry(poses: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -162,17 +148,13 @@ def collate(samples: Sequence[dict[str, Any]]) -> dict[str, Any]:
         Arrays that lead with the sample, and lists of texts.
     """
     window = max(len(sample["mask"]) for sample in samples)
-    out: dict[str, Any] = {}
-    for name, first in samples[0].items():
-        values = [sample[name] for sample in samples]
-        if isinstance(first, str):
-            out[name] = values
-        elif name in WHOLE:
+    out: dict[str, Any] = {name: [sample[name] for sample in samples] for name in samples[0]}
+    for name, values in out.items():
+        if name in WHOLE:
             out[name] = np.stack(values)
-        else:
-            out[name] = np.stack(
-                [np.concatenate([np.zeros((window - len(v), *v.shape[1:]), v.dtype), v]) for v in values]
-            )
+        elif not isinstance(values[0], str):
+            pad = [np.zeros((window - len(v), *v.shape[1:]), v.dtype) for v in values]
+            out[name] = np.stack([*map(np.concatenate, zip(pad, values, strict=True))])
     return out
 
 

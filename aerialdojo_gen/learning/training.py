@@ -10,7 +10,7 @@ import time
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,9 +37,6 @@ from aerialdojo_gen.pipeline.progress import Rate, Reporter, duration
 from aerialdojo_gen.store.atomic import atomic_file, make_folder
 from aerialdojo_gen.store.files import file_digest
 from aerialdojo_gen.store.root import DataRoot, LocalRoot, Where, open_root
-
-if TYPE_CHECKING:
-    from aerialdojo_gen.learning.imitation import TrainingLog
 
 _SETTINGS, _CHECKPOINT, _HISTORY = "training.json", "checkpoint.safetensors", "history.jsonl"
 # Seconds between progress lines.
@@ -260,48 +257,39 @@ class _Training:
 
     def _learn(self, parts: list[Steps], phase: int) -> None:
         train, dagger = self._recipe.train, self._recipe.dagger
+        self._rate, self._what = Rate(), {-1: "sight", 0: "imitation"}.get(phase, f"round {phase}")
         if phase < 0 and self._exploration is not None:
             from aerialdojo_gen.learning.imitation import train_patch_classifier
 
-            log = self._log("sight", self._recipe.sight.epochs)
-            train_patch_classifier(self._learner, self._exploration, self._about.named, log)
+            train_patch_classifier(self._learner, self._exploration, self._about.named, self)
             return
         epochs, rate = (dagger.epochs, dagger.learning_rate) if phase else (train.epochs, train.learning_rate)
         pool = self._pool(parts)
-        log = self._log(f"round {phase}" if phase else "imitation", epochs)
-        self._learner.learn(pool, self._exploration, self._held_out(pool.nav_id), epochs, rate, log)
+        self._learner.learn(pool, self._exploration, self._held_out(pool.nav_id), epochs, rate, self)
 
-    def _log(self, what: str, epochs: int) -> TrainingLog:
-        from aerialdojo_gen.learning.imitation import TrainingLog
-
-        rate = Rate()
-
-        def on_batch(done: int, total: int, loss: float, accuracy: float) -> None:
-            per_s = rate.per_s(done)
-            now = time.monotonic()
-            if self._tensorboard is not None:
-                self._tensorboard.add_scalar(f"{what}/loss", loss, done)
-                self._tensorboard.add_scalar(f"{what}/accuracy", accuracy, done)
-            if now - self._reported >= _REPORT_EVERY_S:
-                self._reported = now
-                left = f", {duration((total - done) / per_s)} left" if per_s else ""
-                self._reporter.line(
-                    f"{what}: batch {done:,} of {total:,}, loss {loss:.3f}, accuracy {accuracy:.1%}{left}"
-                )
-            if now - self._kept >= self._recipe.train.checkpoint_s:
-                self._save_checkpoint()
-
-        def on_epoch(row: dict[str, Any], left_s: float) -> None:
-            kept = f" (kept back: {_describe(row['kept_back'])})" if row["kept_back"] else ""
+    def on_batch(self, done: int, total: int, loss: float, accuracy: float) -> None:
+        per_s, now = self._rate.per_s(done), time.monotonic()
+        if self._tensorboard is not None:
+            self._tensorboard.add_scalar(f"{self._what}/loss", loss, done)
+            self._tensorboard.add_scalar(f"{self._what}/accuracy", accuracy, done)
+        if now - self._reported >= _REPORT_EVERY_S:
+            self._reported = now
+            left = f", {duration((total - done) / per_s)} left" if per_s else ""
             self._reporter.line(
-                f"{what}: epoch {row['epoch'] + 1} of {epochs}, loss {row['loss']:.3f}, accuracy "
-                f"{row['accuracy']:.1%}{kept}, {duration(left_s)} left"
+                f"{self._what}: batch {done:,} of {total:,}, loss {loss:.3f}, accuracy {accuracy:.1%}{left}"
             )
-            with (self._folder / _HISTORY).open("a", encoding="utf-8") as file:
-                file.write(json.dumps(row) + "\n")
+        if now - self._kept >= self._recipe.train.checkpoint_s:
             self._save_checkpoint()
 
-        return TrainingLog(on_batch, on_epoch)
+    def on_epoch(self, row: dict[str, Any], epochs: int, left_s: float) -> None:
+        kept = f" (kept back: {_describe(row['kept_back'])})" if row["kept_back"] else ""
+        self._reporter.line(
+            f"{self._what}: epoch {row['epoch'] + 1} of {epochs}, loss {row['loss']:.3f}, accuracy "
+            f"{row['accuracy']:.1%}{kept}, {duration(left_s)} left"
+        )
+        with (self._folder / _HISTORY).open("a", encoding="utf-8") as file:
+            file.write(json.dumps(row) + "\n")
+        self._save_checkpoint()
 
     def _save_checkpoint(self) -> None:
         progress = asdict(self._learner.progress)

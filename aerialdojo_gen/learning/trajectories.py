@@ -21,7 +21,7 @@ from aerialdojo_gen.benchmark.agents.goal import Sensors
 from aerialdojo_gen.benchmark.tasks import Selection, draw_evenly, mesh_of, reference_image
 from aerialdojo_gen.benchmark.worlds import make_worlds
 from aerialdojo_gen.learning.index import Index, read_indices
-from aerialdojo_gen.learning.labels import PRIVILEGED, Labels, scatter_rows, split_batch
+from aerialdojo_gen.learning.labels import PRIVILEGED, labels_at, scatter_rows, split_batch
 from aerialdojo_gen.learning.loader import Order
 from aerialdojo_gen.learning.pictures import (
     CachedFrames,
@@ -164,7 +164,6 @@ class Trajectories:
         if own.limit is not None:
             self.index = self.index.take(sample_evenly(self.index, own.limit, own.seed))
         self._source = None if self.sensors.blind else self._open_source(own)
-        self._labels = Labels(self.index, self.privileged)
         steps = self.index.steps
         ends = np.ones(len(steps), np.int64) if own.past is None else (steps - 1) // own.stride + 1
         self._first = np.concatenate([[0], np.cumsum(ends)])
@@ -242,7 +241,8 @@ class Trajectories:
         mask = steps >= 0
         out: dict[str, Any] = {"mask": mask, "step": ends, "nav_id": [self.index.nav_id[k] for k, _ in places]}
         out |= self._goals(rows)
-        out |= self._labels.of(rows, steps, mask)
+        labels = [labels_at(self.index, k, steps[i, mask[i]], self.privileged) for i, (k, _) in enumerate(places)]
+        out |= {name: scatter_rows(np.concatenate([of[name] for of in labels]), mask) for name in labels[0]}
         frames = self._frames(np.broadcast_to(rows[:, None], steps.shape)[mask], steps[mask])
         for name, seen in frames.items():
             out[name] = seen.reshape(*mask.shape, *seen.shape[1:]) if mask.all() else scatter_rows(seen, mask)

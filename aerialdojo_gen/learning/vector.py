@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any, SupportsFloat
 
@@ -180,6 +180,10 @@ def _make_one(data: str, options: dict[str, Any], wrappers: Sequence[Callable[..
     return env
 
 
+# How the views of a step become one array.
+_JOIN: Mapping[str, Callable[..., Any]] = {"rgb": np.concatenate, "depth_m": np.stack}
+
+
 class Flattened(gymnasium.ObservationWrapper[dict[str, Any], np.int64, dict[str, Any]]):
     """Observations of one level without texts, for learners that read arrays alone (Stable-Baselines3).
 
@@ -200,18 +204,14 @@ class Flattened(gymnasium.ObservationWrapper[dict[str, Any], np.int64, dict[str,
         self.vocabulary = vocabulary or Vocabulary.of(goal_text(*said) for said in own.goals_in_words())
         seen = own.observation_space
         tokens = spaces.Box(0, len(self.vocabulary) - 1, (self.vocabulary.length,), np.int64)
-        flat: dict[str, spaces.Space[Any]] = {
-            "tokens": tokens,
-            "remaining_actions": seen["remaining_actions"],
-            "refused": spaces.Box(0, 1, (1,), np.int32),
-        }
-        if "rgb" in seen.spaces:
-            views = list(seen["rgb"].spaces.values())  # type: ignore[attr-defined]
-            height, width, _ = views[0].shape
-            flat["rgb"] = spaces.Box(0, 255, (height, width, 3 * len(views)), np.uint8)
-        if "depth_m" in seen.spaces:
-            views = list(seen["depth_m"].spaces.values())  # type: ignore[attr-defined]
-            flat["depth_m"] = spaces.Box(0.0, float(views[0].high.max()), (*views[0].shape, len(views)), np.float32)
+        refused = spaces.Box(0, 1, (1,), np.int32)
+        flat = {"tokens": tokens, "remaining_actions": seen["remaining_actions"], "refused": refused}
+        for name in self._JOINED.keys() & seen.spaces.keys():
+            views: list[Any] = list(seen[name].spaces.values())  # type: ignore[attr-defined]
+            low, high = (
+                self._JOINED[name]([getattr(view, end) for view in views], axis=-1) for end in ("low", "high")
+            )
+            flat[name] = spaces.Box(low, high, dtype=views[0].dtype)
         self.observation_space = spaces.Dict(flat)
 
     def observation(self, observation: dict[str, Any]) -> dict[str, Any]:
@@ -223,8 +223,6 @@ class Flattened(gymnasium.ObservationWrapper[dict[str, Any], np.int64, dict[str,
             "remaining_actions": observation["remaining_actions"],
             "refused": np.array([observation["refused"]], np.int32),
         }
-        if "rgb" in observation:
-            flat["rgb"] = np.concatenate(list(observation["rgb"].values()), axis=-1)
-        if "depth_m" in observation:
-            flat["depth_m"] = np.stack(list(observation["depth_m"].values()), axis=-1)
+        for name in _JOIN.keys() & observation.keys():
+            flat[name] = _JOIN[name](list(observation[name].values()), axis=-1)
         return flat
