@@ -12,10 +12,17 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.base.errors import StoreError, UsageError
 from aerialdojo_gen.exchange import aerialdojo_layout as layout
-from aerialdojo_gen.exchange.fields import BadField, Fields, plain, positions_of, quaternions_of, shown
 from aerialdojo_gen.exchange.folder import inside
 from aerialdojo_gen.exchange.frames import WORDS, actions_of
-from aerialdojo_gen.exchange.jsonstream import small_document
+from aerialdojo_gen.exchange.records import (
+    BadField,
+    Fields,
+    plain,
+    positions_of,
+    quaternions_of,
+    shown,
+    small_document,
+)
 from aerialdojo_gen.exchange.task import Context, Instance, Route, Task, digest, picture_at
 from aerialdojo_gen.pipeline.stages.work.build_scenes import parse_name
 

@@ -92,17 +92,12 @@ def _gzip(path: Path) -> Iterator[gzip.GzipFile]:
 
 
 def _goal(row: Mapping[str, Any], anchors: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    views = [
-        {
-            "agent_state": {
-                "position": _position(anchor),
-                "rotation": yaw_to_habitat_quaternion_xyzw(anchor["yaw_rad"]).tolist(),
-            },
-            # Habitat's iou is the share of the view that the object covers: known where there is a picture.
-            "iou": row["image_fraction"] if anchor["selected"] else None,
-        }
-        for anchor in anchors
-    ]
+    views = []
+    for anchor in anchors:
+        rotation = yaw_to_habitat_quaternion_xyzw(anchor["yaw_rad"]).tolist()
+        # Habitat's iou is the share of the view that the object covers: known where there is a picture.
+        iou = row["image_fraction"] if anchor["selected"] else None
+        views.append({"agent_state": {"position": _position(anchor), "rotation": rotation}, "iou": iou})
     return {
         "object_id": row["object_id"],
         "object_name": row["name"],
@@ -122,10 +117,7 @@ def _episodes(routes: pa.Table, mesh: str, category_of: Mapping[int, str]) -> It
         for row in batch.to_pylist():
             positions = world_to_habitat(np.column_stack([row["x_m"], row["y_m"], row["z_m"]])).tolist()
             rotations = yaw_to_habitat_quaternion_xyzw(row["yaw_rad"]).tolist()
-            points = [
-                {"position": position, "rotation": rotation, "action": action}
-                for position, rotation, action in zip(positions, rotations, row["action"], strict=True)
-            ]
+            points = zip(positions, rotations, row["action"], strict=True)
             yield {
                 "scene_id": mesh,
                 "scene_dataset_config": "default",
@@ -140,6 +132,6 @@ def _episodes(routes: pa.Table, mesh: str, category_of: Mapping[int, str]) -> It
                     "setting": row["setting"],
                 },
                 "goals": [],
-                "shortest_paths": [points],
+                "shortest_paths": [[dict(zip(("position", "rotation", "action"), of, strict=True)) for of in points]],
                 "object_category": category_of[row["target_object_id"]],
             }

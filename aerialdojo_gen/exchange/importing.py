@@ -6,7 +6,6 @@ import os
 from array import array
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TextIO
@@ -16,10 +15,9 @@ import numpy as np
 from aerialdojo_gen.base.errors import ImportRefused, StoreError, UsageError, brief
 from aerialdojo_gen.base.names import unknown
 from aerialdojo_gen.exchange import aerialdojo_reader, readers
-from aerialdojo_gen.exchange.fields import BadField, Fields
 from aerialdojo_gen.exchange.folder import whole_folder_below, write_json
 from aerialdojo_gen.exchange.frames import FRAMES, Frame
-from aerialdojo_gen.exchange.jsonstream import RECORD_LIMIT, records
+from aerialdojo_gen.exchange.records import RECORD_LIMIT, BadField, Fields, records
 from aerialdojo_gen.exchange.task import Context, Tables, Task, digest, route_row, task_rows
 from aerialdojo_gen.store.layout import check_scene_name, is_plain
 from aerialdojo_gen.store.root import Where, open_root
@@ -166,17 +164,17 @@ Read = Callable[[Fields, Context], Task]
 class Format:
     """A format that can be imported."""
 
-    reader: Callable[[], Read]  # Makes what reads the records of one import
+    read: Read | None  # Reads a record; None where a reader of its own remembers those before
     key: str | None = None  # Where the list of records stands; None: it is the whole file
     frame: str | None = "ned"  # Its frame; None where the format does not state it
 
 
 FORMATS = {
-    "aerialdojo": Format(lambda: aerialdojo_reader.Reader().read),
-    "uav-on": Format(lambda: readers.read_uav_on),
-    "cityavos": Format(lambda: readers.read_cityavos, frame=None),
-    "aerialvln": Format(lambda: readers.read_aerialvln, key="episodes"),
-    "openfly": Format(lambda: readers.read_openfly, frame=None),
+    "aerialdojo": Format(None),
+    "uav-on": Format(readers.read_uav_on),
+    "cityavos": Format(readers.read_cityavos, frame=None),
+    "aerialvln": Format(readers.read_aerialvln, key="episodes"),
+    "openfly": Format(readers.read_openfly, frame=None),
 }
 
 
@@ -214,11 +212,11 @@ def import_benchmark(
     if not is_plain(name or format_name):
         raise UsageError(f"{name!r} cannot name an import: use letters, digits, _ and - (64 at most)")
     root, target = open_root(data), f"imported/{name or format_name}"
-    with whole_folder_below(root, target, MARKER, force=force) as folder, ExitStack() as stack:
-        bad = stack.enter_context((folder / "bad_records.txt").open("w", encoding="utf-8"))
+    with whole_folder_below(root, target, MARKER, force=force) as folder:
         tables, objects = Tables(folder), Objects()
-        for task, source in _tasks(sources, chosen, frame, options, report, bad):
-            _write(task, source, tables, objects, report)
+        with (folder / "bad_records.txt").open("w", encoding="utf-8") as bad:
+            for task, source in _tasks(sources, chosen, frame, options, report, bad):
+                _write(task, source, tables, objects, report)
         if report.n_bad and not options.skip_bad:
             more = [f"and {report.n_bad - len(report.bad):,} more"] if report.n_bad > len(report.bad) else []
             head = f"{report.n_bad:,} of {report.records:,} records are bad, nothing is written"
@@ -227,7 +225,6 @@ def import_benchmark(
         tables.close()
         report.rows = dict(tables.written)
         report.empty = {column: n for column, n in tables.nulls.items() if n}
-        bad.close()
         if not report.n_bad:
             (folder / "bad_records.txt").unlink()
         write_json(folder / MARKER, report.document())
@@ -271,11 +268,11 @@ def _sources(format_name: str, files: Sequence[Path]) -> list[tuple[str, Path]]:
 def _tasks(
     sources: Sequence[tuple[str, Path]], chosen: Format, frame: Frame, options: Options, report: Report, bad: TextIO
 ) -> Iterator[tuple[Task, dict[str, Any]]]:
-    read = chosen.reader()
+    read = chosen.read or aerialdojo_reader.Reader().read
     for label, path in sources:
         report.files.append(label)
         pictures = (options.pictures or path.parent) if options.with_pictures else None
-        seen: set[str] = set()
+        ids: set[str] = set()
         for row, value in enumerate(records(path, chosen.key, limit=options.record_limit)):
             report.records += 1
             # Notes count only if the record turns out good.
@@ -283,23 +280,19 @@ def _tasks(
             try:
                 record = Fields(value)
                 task = read(record, context)
-                _check(task, seen)
+                try:
+                    check_scene_name(task.scene)
+                except StoreError as error:
+                    raise BadField("scene", str(error)) from None
+                if task.source_id in ids:
+                    raise BadField("id", f"{brief(task.source_id, 60)} appears twice in the file")
             except BadField as error:
                 bad.write(report.refuse(label, row, error) + "\n")
                 continue
+            ids.add(task.source_id)
             report.left(record.unread())
             report.notes.update(context.notes)
             yield task, {"source_file": label, "source_row": row, "source_id": task.source_id}
-
-
-def _check(task: Task, seen: set[str]) -> None:
-    try:
-        check_scene_name(task.scene)
-    except StoreError as error:
-        raise BadField("scene", str(error)) from None
-    if task.source_id in seen:
-        raise BadField("id", f"{brief(task.source_id, 60)} appears twice in the file")
-    seen.add(task.source_id)
 
 
 def _write(task: Task, source: dict[str, Any], tables: Tables, objects: Objects, report: Report) -> None:

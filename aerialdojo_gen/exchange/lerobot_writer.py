@@ -111,6 +111,7 @@ QP = 20
 DEPTH_CODES = 4096
 # Metres, of LeRobot's logarithmic steps: code 0 is 0 m, which is "nothing within range" here.
 DEPTH_MIN_M, DEPTH_SHIFT_M = 0.0, 3.5
+_LOW = math.log(DEPTH_MIN_M + DEPTH_SHIFT_M)
 
 _OPTIONS = {
     # A constant quantiser, and nothing that is decided by floating-point numbers: their sums depend on the processor.
@@ -158,19 +159,15 @@ class Clip:
 
 def depth_codes(depth_m: NDArray[np.float32], most_m: float) -> NDArray[np.uint16]:
     """Depth in metres, up to `most_m`, as LeRobot's logarithmic 12-bit codes; the error is at most half a step."""
-    low, span = math.log(DEPTH_MIN_M + DEPTH_SHIFT_M), _span(most_m)
-    scaled = (np.log(depth_m + np.float32(DEPTH_SHIFT_M)) - np.float32(low)) * np.float32((DEPTH_CODES - 1) / span)
+    span = math.log(most_m + DEPTH_SHIFT_M) - _LOW
+    scaled = (np.log(depth_m + np.float32(DEPTH_SHIFT_M)) - np.float32(_LOW)) * np.float32((DEPTH_CODES - 1) / span)
     return np.rint(scaled).clip(0, DEPTH_CODES - 1).astype(np.uint16)
 
 
 def depths_of_codes_m(most_m: float) -> NDArray[np.float64]:
     """Return the depths that codes stand for, (4096,) float64, metres."""
-    steps = np.arange(DEPTH_CODES) * (_span(most_m) / (DEPTH_CODES - 1))
-    return np.clip(np.exp(steps + math.log(DEPTH_MIN_M + DEPTH_SHIFT_M)) - DEPTH_SHIFT_M, DEPTH_MIN_M, most_m)
-
-
-def _span(most_m: float) -> float:
-    return math.log(most_m + DEPTH_SHIFT_M) - math.log(DEPTH_MIN_M + DEPTH_SHIFT_M)
+    steps = np.arange(DEPTH_CODES) * ((math.log(most_m + DEPTH_SHIFT_M) - _LOW) / (DEPTH_CODES - 1))
+    return np.clip(np.exp(steps + _LOW) - DEPTH_SHIFT_M, DEPTH_MIN_M, most_m)
 
 
 QUANTILES = {"q01": 0.01, "q10": 0.10, "q50": 0.50, "q90": 0.90, "q99": 0.99}
@@ -239,8 +236,9 @@ def write_part(root: DataRoot, part: Part, options: ExportOptions, folder: Path)
 
 
 def _no_counts(options: ExportOptions) -> Counts:
-    shapes = {"rgb": (3, 256), "depth": (1, DEPTH_CODES)}
-    return {key: np.zeros(shapes[kind], np.int64) for key, kind in video_kinds(options).items()}
+    shapes, kinds = {"rgb": (3, 256), "depth": (1, DEPTH_CODES)}, video_kinds(options)
+    keys = [key for view in options.sensors.views for key in (view_key(view), depth_key(view))]
+    return {key: np.zeros(shapes[kinds[key]], np.int64) for key in (*keys, GOAL) if key in kinds}
 
 
 def _columns(part: Part, k: int) -> dict[str, NDArray[Any]]:

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from aerialdojo_gen.exchange.fields import BadField, Fields, Floats, rows_of, shown
 from aerialdojo_gen.exchange.frames import Move, move, replay_moves
+from aerialdojo_gen.exchange.records import BadField, Fields, Floats, rows_of, shown
 from aerialdojo_gen.exchange.task import Context, Instance, Route, Task, picture_at
 
 AERIALVLN_MOVES = dict(enumerate(map(move, (
@@ -72,29 +72,19 @@ def read_aerialvln(record: Fields, context: Context) -> Task:
         if any(len(row) > 3 for row in rows):
             context.notes["reference_path has attitudes: yaws are taken from start_rotation and the turns"] += 1
         points = context.frame.positions_to_world(record.positions_of([row[:3] for row in rows], "reference_path"))
-        route = _aerialvln_route(record, context, start, points)
+        if record.has("actions"):
+            moves = moves_of(record, "actions", AERIALVLN_MOVES)
+            done = without_stop(moves)
+            fits = len(done) == len(points) - 1
+            yaws = replay_moves(start, done)[:, 3] if fits else np.full(len(points), start[3])
+            route = route_of(moves, np.column_stack([points, yaws]), context)
+        else:
+            context.notes["reference_path without actions, hence without yaws: left aside"] += 1
     if len(goals) > 1:
         context.notes["has several goals: the first is kept"] += 1
     record.has("trajectory_id") and record.name("trajectory_id")
-    return Task(
-        source_id=record.name("episode_id"),
-        scene=record.name("scene_id"),
-        start=start,
-        goal=goal,
-        instances=[Instance("semantic", instruction.text("instruction_text", empty=False))],
-        route=route,
-    )
-
-
-def _aerialvln_route(record: Fields, context: Context, start: Floats, points: Floats) -> Route | None:
-    if not record.has("actions"):
-        context.notes["reference_path without actions, hence without yaws: left aside"] += 1
-        return None
-    moves = moves_of(record, "actions", AERIALVLN_MOVES)
-    done = without_stop(moves)
-    fits = len(done) == len(points) - 1
-    yaws = replay_moves(start, done)[:, 3] if fits else np.full(len(points), start[3])
-    return route_of(moves, np.column_stack([points, yaws]), context)
+    instances = [Instance("semantic", instruction.text("instruction_text", empty=False))]
+    return Task(record.name("episode_id"), record.name("scene_id"), start, goal, instances, route=route)
 
 
 def read_openfly(record: Fields, context: Context) -> Task:
@@ -109,14 +99,9 @@ def read_openfly(record: Fields, context: Context) -> Task:
         raise BadField(f"yaw[{k}]", f"{yaws[k]:g} is more than a turn in radians: degrees?")
     poses = np.column_stack([points, context.frame.yaw_to_world(yaws)])
     route = route_of(moves_of(record, "action", OPENFLY_MOVES), poses, context)
-    return Task(
-        source_id=image_path,
-        scene=image_path.replace("\\", "/").split("/")[0],
-        start=poses[0],
-        goal=points[-1],
-        instances=[Instance("semantic", record.text("gpt_instruction", empty=False))],
-        route=route,
-    )
+    instances = [Instance("semantic", record.text("gpt_instruction", empty=False))]
+    scene = image_path.replace("\\", "/").split("/")[0]
+    return Task(image_path, scene, poses[0], points[-1], instances, route=route)
 
 
 def read_cityavos(record: Fields, context: Context) -> Task:
@@ -131,15 +116,8 @@ def read_cityavos(record: Fields, context: Context) -> Task:
     if context.pictures is not None:
         name = record.text("target_image_path", empty=False)
         instances.append(Instance("image", picture=picture_at(context.pictures, name, "target_image_path")))
-    return Task(
-        source_id=record.name("mission_id"),
-        scene=record.name("scene_id"),
-        start=start,
-        goal=goal,
-        instances=instances,
-        object_key=tuple(goal.tolist()),
-        object_m=goal,
-    )
+    source_id, scene = record.name("mission_id"), record.name("scene_id")
+    return Task(source_id, scene, start, goal, instances, object_key=tuple(goal.tolist()), object_m=goal)
 
 
 def _radians(yaw: float, context: Context) -> float:
@@ -165,22 +143,12 @@ def read_uav_on(record: Fields, context: Context) -> Task:
     if len(places) > 1:
         context.notes["pose has several places of the target: the nearest to the start is the goal"] += 1
     scene, node = record.name("map_name"), record.text("object_name", empty=False)
-    known: dict[str, Any] = {
-        "target_name": record.text("true_name", empty=False),
-        "mesh_node": node,
-        "category": record.optional_text("category"),
-    }
+    known: dict[str, Any] = {"target_name": record.text("true_name", empty=False), "mesh_node": node}
+    known["category"] = record.optional_text("category")
     if record.has("used-in-train"):
         known["subset"] = "train" if record.flag("used-in-train") else "test"
     if record.has("info") and (info := record.child("info")).has("geodesic_distance"):
         known["stated_length_m"] = info.number("geodesic_distance")
-    return Task(
-        source_id=f"{scene}/{record.name('episode_id')}",
-        scene=scene,
-        start=start,
-        goal=nearest,
-        instances=[Instance("semantic", record.optional_text("description"))],
-        object_key=(node, *nearest.tolist()),
-        object_m=nearest,
-        known=known,
-    )
+    instances, key = [Instance("semantic", record.optional_text("description"))], (node, *nearest.tolist())
+    source_id = f"{scene}/{record.name('episode_id')}"
+    return Task(source_id, scene, start, nearest, instances, object_key=key, object_m=nearest, known=known)

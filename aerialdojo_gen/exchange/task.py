@@ -17,9 +17,9 @@ import pyarrow as pa
 from numpy.typing import ArrayLike, NDArray
 
 from aerialdojo_gen.base.config.shared import TaskConfig
-from aerialdojo_gen.exchange.fields import BadField
 from aerialdojo_gen.exchange.folder import check_picture, inside
 from aerialdojo_gen.exchange.frames import Frame
+from aerialdojo_gen.exchange.records import BadField
 from aerialdojo_gen.geometry.frames import quaternion_xyzw_to_yaw, wrap_turned_rad
 from aerialdojo_gen.geometry.motion import route_length_m
 from aerialdojo_gen.store.parquet_files import write_file

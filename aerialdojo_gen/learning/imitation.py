@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.base import rng
 from aerialdojo_gen.learning.loader import torch_package
-from aerialdojo_gen.learning.localization import UNIT_M, LocalizationOutput, offset_loss, pose_loss
-from aerialdojo_gen.learning.network import Network, PolicyOutput
+from aerialdojo_gen.learning.network import UNIT_M, LocalizationOutput, Network, PolicyOutput, offset_loss, pose_loss
 from aerialdojo_gen.learning.parts import NOTHING
 from aerialdojo_gen.learning.recipe import Recipe
 from aerialdojo_gen.learning.steps import Pool
@@ -314,13 +313,16 @@ def train_patch_classifier(learner: Learner, exploration: Pool, words: tuple[str
 
     def step(rows: NDArray[np.int64], rate: float) -> tuple[float, float, int]:
         draw = rng.generator(recipe.seed, "sight patches", progress.epoch, progress.batch)
-        keep, wanted = _select_patches(exploration.shown(rows), chances, draw)
+        # Patches to learn from. An object of whose name no word is known teaches nothing.
+        shown = exploration.shown(rows).ravel()
+        named = (shown >= 0) & (chances.sum(axis=1)[shown] > 0.0)
+        keep = np.flatnonzero(named | ((shown == NOTHING) & (draw.random(len(shown)) < _EMPTY)))
         if not len(keep):
             return 0.0, 0.0, 0
-        pictures = torch.from_numpy(exploration.frames(rows)).to(learner.device)
-        target = torch.from_numpy(wanted).to(learner.device)
+        wanted = chances[np.where(shown[keep] == NOTHING, len(chances) - 1, shown[keep])]
+        arrays = (exploration.frames(rows), keep, wanted)
+        pictures, kept, target = (torch.from_numpy(array).to(learner.device) for array in arrays)
         with learner.autocast():
-            kept = torch.from_numpy(keep).to(learner.device)
             logits = learner.network.sight(pictures.flatten(0, 1), kept).float()
         cost = torch.nn.functional.cross_entropy(logits, target)
         learner.update(cost, rate)
@@ -328,14 +330,3 @@ def train_patch_classifier(learner: Learner, exploration: Pool, words: tuple[str
         return float(cost.detach()), float(right), len(keep)
 
     learner.run_epochs(recipe.sight.epochs, batches, recipe.sight.learning_rate, log, step=step)
-
-
-def _select_patches(
-    shown: NDArray[np.int64], chances: NDArray[np.float32], draw: np.random.Generator
-) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
-    """Choose patches to learn from: their numbers, and the chances of their words."""
-    flat = shown.ravel()
-    # An object of whose name no word is known teaches nothing.
-    named = (flat >= 0) & (chances.sum(axis=1)[flat] > 0.0)
-    keep = np.flatnonzero(named | ((flat == NOTHING) & (draw.random(len(flat)) < _EMPTY)))
-    return keep, chances[np.where(flat[keep] == NOTHING, len(chances) - 1, flat[keep])]

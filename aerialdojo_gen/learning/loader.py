@@ -174,9 +174,8 @@ class Loader:
 
     def __iter__(self) -> Iterator[dict[str, Any]]:
         """Yield what is left of the epoch; the next iteration is the next epoch."""
-        order = self._data.order(
-            self._batch_size, seed=self._seed, epoch=self.epoch, start=self.batches_done, **self._how
-        )
+        at = {"seed": self._seed, "epoch": self.epoch, "start": self.batches_done}
+        order = self._data.order(self._batch_size, **at, **self._how)
         batches = self._from_workers(order) if self._workers else (self._data.batch(n) for n in order)
         for batch in batches:
             self.batches_done += 1

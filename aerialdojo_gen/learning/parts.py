@@ -173,7 +173,11 @@ def collect_views(part: Part, exploration: Exploration) -> Steps:
         rows = trajectory == k
         poses[rows] = index.poses_of(int(k))[at[rows] - index.first[k]]
     poses[:, 3] = draw.uniform(-np.pi, np.pi, exploration.looks)
-    poses[:, :3] = _offset_places(part.space, poses[:, :3], draw)
+    # Up to the first obstacle.
+    aside, space = draw.normal(size=(exploration.looks, 3)), part.space
+    aside *= (draw.uniform(0.0, _MAX_OFFSET_M, exploration.looks) / np.linalg.norm(aside, axis=1))[:, None]
+    for pose, there in zip(poses, (poses[:, :3] + aside).tolist(), strict=True):
+        pose[:3], _, _ = space.fly(tuple(pose[:3].tolist()), tuple(there))
     names, number = _named(part, index)
     shown = np.empty((len(poses), len(part.sensors.views) * (part.sensors.width // PATCH_PX) ** 2), np.int16)
 
@@ -185,21 +189,11 @@ def collect_views(part: Part, exploration: Exploration) -> Steps:
     return Steps(
         frames=frames, first=np.arange(n + 1), label=none,
         odometry=np.zeros((n, 4), np.float32), offset=np.zeros((n, 3), np.float32),
-        pose=poses.astype(np.float32), blocked=blocked_at(part.space, poses),
+        pose=poses.astype(np.float32), blocked=blocked_at(space, poses),
         text=np.full((n, 2), ""), image=none - 1,
         semantic=np.zeros(n, np.bool_), images=np.zeros((0, *part.image_shape), np.uint8),
         nav_id=np.full(n, ""), scene=np.full(n, part.scene), shown=shown, names=np.array(names, np.str_),
     )  # fmt: skip
-
-
-def _offset_places(space: FlightSpace, places: NDArray[np.float64], draw: np.random.Generator) -> NDArray[np.float64]:
-    """Move places (n, 3) by random offsets, up to the first obstacle."""
-    aside = draw.normal(size=places.shape)
-    aside *= (draw.uniform(0.0, _MAX_OFFSET_M, len(places)) / np.linalg.norm(aside, axis=1))[:, None]
-    out = places.copy()
-    for k, (here, there) in enumerate(zip(places.tolist(), (places + aside).tolist(), strict=True)):
-        out[k], _, _ = space.fly(tuple(here), tuple(there))
-    return out
 
 
 def _named(part: Part, index: Index) -> tuple[list[str], NDArray[np.int16]]:

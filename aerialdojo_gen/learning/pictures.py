@@ -9,11 +9,13 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import itertools
 import json
 import os
 import struct
 import zlib
-from collections.abc import Iterator, Sequence
+from collections import defaultdict
+from collections.abc import Sequence
 from dataclasses import asdict
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -153,14 +155,11 @@ class CachedFrames:
 
     def _room(self) -> bool:
         if self._used is None or self._since > _RECOUNT:
-            self._used, self._since = sum(_sizes(self._folder)), 0
+            self._used, self._since = 0, 0
+            for path in self._folder.glob("*/*.pix"):
+                with contextlib.suppress(OSError):
+                    self._used += path.stat().st_size
         return self._used < self._most_bytes
-
-
-def _sizes(folder: Path) -> Iterator[int]:
-    for path in folder.glob("*/*.pix"):
-        with contextlib.suppress(OSError):
-            yield path.stat().st_size
 
 
 # What the chosen views show at n poses, of "rgb" and "depth_m" those asked for: (n, views, H, W, 3) uint8, sRGB, and
@@ -262,19 +261,15 @@ def recorded_frames(root: DataRoot, scene: str, sensors: Sensors) -> dict[str, i
     if not root.list("recordings", f"{scene}/*.parquet"):
         return {}
     columns = ("nav_id", "view", "modality", "sampling", "n_frames", "width", "height", "fov_deg", "ok")
-    rows = store.read_stored(root, "recordings", scene, columns).to_pylist()
-    wanted = {
-        (view, kind) for view in sensors.views for kind, on in (("rgb", sensors.rgb), ("depth", sensors.depth)) if on
-    }
-    seen: dict[str, set[tuple[str, str]]] = {}
-    frames: dict[str, int] = {}
-    for row in rows:
+    kinds = [kind for kind, on in (("rgb", sensors.rgb), ("depth", sensors.depth)) if on]
+    found: dict[str, dict[tuple[str, str], int]] = defaultdict(dict)
+    for row in store.read_stored(root, "recordings", scene, columns).to_pylist():
         # Pixels of another shape would show another field of view.
         fits = row["width"] * sensors.height == row["height"] * sensors.width and row["fov_deg"] == sensors.fov_deg
         if row["ok"] and row["sampling"] == "steps" and fits:
-            seen.setdefault(row["nav_id"], set()).add((row["view"], row["modality"]))
-            frames[row["nav_id"]] = row["n_frames"]
-    return {nav_id: frames[nav_id] for nav_id, kinds in seen.items() if wanted <= kinds}
+            found[row["nav_id"]][row["view"], row["modality"]] = row["n_frames"]
+    wanted = {*itertools.product(sensors.views, kinds)}
+    return {nav_id: [*frames.values()][-1] for nav_id, frames in found.items() if wanted <= frames.keys()}
 
 
 # Few are kept open: a trajectory's steps follow each other within a block.

@@ -106,9 +106,8 @@ class InitialWeights:
 
     def check_fit(self, sensors: Sensors, model: ModelConfig) -> None:
         """Refuse a recipe with other views or sizes; UsageError names the key."""
-        own = self.about.sensors
+        own, sizes = self.about.sensors, model.model_dump(mode="json").items()
         pairs = {"[data] views": (list(own.views), list(sensors.views)), "[data] size_px": (own.width, sensors.width)}
-        sizes = model.model_dump(mode="json").items()
         pairs |= {f"[model] {key}": (self.about.shape[key], value) for key, value in sizes}
         for key, (its, ours) in pairs.items():
             if its != ours:
@@ -207,8 +206,8 @@ class Policy(AgentBase):
         self._doubt: list[float] = []
         # Looks that nothing was searched in: what is known needs no search, and it takes half as long as all else.
         self._unsearched: list[tuple[Any, NDArray[np.float32]]] = []
-        target_words = word_targets([goal.target_name], about.named)[0] if about.named else None
-        self._search = None if target_words is None else Search(target_words, self.sensors)
+        words = word_targets([goal.target_name], about.named)[0]
+        self._search = Search(words, self.sensors) if about.named else None
 
     def act(self, observation: Observation) -> int:
         """Observe, update the memory, choose."""
@@ -217,8 +216,7 @@ class Policy(AgentBase):
             self._reckoning.add(self._previous, bool(observation.refused))
         pictures = None
         if sensors.views:
-            rgb = np.stack([observation.rgb[view] for view in sensors.views])
-            depth_m = np.stack([observation.depth_m[view] for view in sensors.views])
+            rgb, depth_m = (np.stack([of[v] for v in sensors.views]) for of in (observation.rgb, observation.depth_m))
             pictures = torch.from_numpy(packed(rgb, depth_m, sensors)[None]).to(device)
         odometry = torch.from_numpy(self._reckoning.odometry[None, None]).to(device)
         with torch.inference_mode():
@@ -233,9 +231,9 @@ class Policy(AgentBase):
                     self._notice(self._search)
                     away = self._search.towards(self._reckoning.odometry, observation.remaining_actions)
                     estimate = estimate.with_goal_offset(torch.from_numpy(away[None, None]).to(device))
-            thought = self.network.choose(seen, estimate)
+            output = self.network.choose(seen, estimate)
         back = torch.from_numpy(self._reckoning.back[None, None]).to(device)
-        self._previous = int(thought.actions(back)[0, 0])
+        self._previous = int(output.actions(back)[0, 0])
         return self._previous
 
     def _notice(self, search: Search) -> None:
@@ -248,15 +246,13 @@ class Policy(AgentBase):
 
 def _check_shapes(about: PolicyInfo, shape: Any) -> None:
     """Refuse what the weights cannot take; that shape holds for them has been seen. ValueError says what."""
-    sensors, vocabulary = about.sensors, about.vocabulary
+    sensors, vocabulary, edge = about.sensors, about.vocabulary, shape.size_px
     if len(sensors.views) != shape.views or len(vocabulary) != shape.words:
         raise ValueError(
             f"{len(sensors.views)} views and {len(vocabulary)} words, for weights of {shape.views} and {shape.words}"
         )
-    if sensors.views and (sensors.width, sensors.height) != (shape.size_px, shape.size_px):
-        raise ValueError(
-            f"pictures of {sensors.width} x {sensors.height}, for weights of {shape.size_px} x {shape.size_px}"
-        )
+    if sensors.views and (sensors.width, sensors.height) != (edge, edge):
+        raise ValueError(f"pictures of {sensors.width} x {sensors.height}, for weights of {edge} x {edge}")
     if len(about.named) != shape.named:
         raise ValueError(f"{len(about.named)} words to search for, for weights of {shape.named}")
     if about.scenes and len(about.scenes) != shape.scenes:

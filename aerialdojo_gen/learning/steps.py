@@ -61,11 +61,9 @@ def read_steps(folder: Path) -> Steps:
     try:
         with np.load(folder / _STEPS, allow_pickle=False) as file:
             rest = {one.name: file[one.name] for one in fields(Steps) if one.name != "frames"}
-        with (folder / _FRAMES).open("rb") as file:
-            np.lib.format.read_magic(file)
-            shape, _, _ = np.lib.format.read_array_header_1_0(file)
-        # What is empty cannot be mapped.
-        frames = np.load(folder / _FRAMES, mmap_mode="r" if np.prod(shape) else None, allow_pickle=False)
+        # What is empty, a header of 128 bytes alone, cannot be mapped.
+        empty = (folder / _FRAMES).stat().st_size <= 128
+        frames = np.load(folder / _FRAMES, mmap_mode=None if empty else "r", allow_pickle=False)
         return Steps(frames=frames, **rest)
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise StoreError(f"{folder} is damaged: remove it, the same command makes it again ({error})") from None

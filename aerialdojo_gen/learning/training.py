@@ -7,7 +7,7 @@ import importlib
 import json
 import shutil
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -39,6 +39,8 @@ from aerialdojo_gen.store.files import file_digest
 from aerialdojo_gen.store.root import DataRoot, LocalRoot, Where, open_root
 
 _SETTINGS, _CHECKPOINT, _HISTORY = "training.json", "checkpoint.safetensors", "history.jsonl"
+# Of what precedes the rounds of DAgger.
+_PHASES = {-1: "sight", 0: "imitation"}
 # Seconds between progress lines.
 _REPORT_EVERY_S = 15.0
 
@@ -175,9 +177,9 @@ class _Training:
         recipe, learner, report = self._recipe, self._learner, self._reporter
         if restart:
             # The weights too: a phase that has some counts as done. The settings last, for a kill in between.
-            ended = [self._folder / f"{name}.safetensors" for name in ("sight", "imitation", "policy")]
-            for path in (*ended, *self._folder.glob("dagger-*.safetensors")):
-                path.unlink(missing_ok=True)
+            for name in ("sight", "imitation", "policy", "dagger-*"):
+                for path in self._folder.glob(f"{name}.safetensors"):
+                    path.unlink()
             for name in (_CHECKPOINT, _HISTORY, _SETTINGS):
                 (self._folder / name).unlink(missing_ok=True)
         self._check_settings()
@@ -234,15 +236,13 @@ class _Training:
         return (index if d.limit is None else index.take(sample_evenly(index, d.limit, self._recipe.seed))), named
 
     def _weights(self, phase: int) -> Path:
-        names = {-1: "sight", 0: "imitation"}
-        return self._folder / f"{names.get(phase, f'dagger-{phase}')}.safetensors"
+        return self._folder / f"{_PHASES.get(phase, f'dagger-{phase}')}.safetensors"
 
     def _drawn(self, phase: int) -> Index:
         """Draw a round's tasks, without those kept for validation."""
-        index, want = self._index, self._recipe.dagger.episodes
-        rank = [rng.rank(self._recipe.seed, "dagger tasks", phase, nav_id) for nav_id in index.nav_id]
-        free = np.flatnonzero(~self._held_out(np.array(index.nav_id)))
-        return index.take(np.sort(free[np.argsort(np.array(rank, np.uint64)[free], kind="stable")[:want]]))
+        index, free = self._index, np.flatnonzero(~self._held_out(self._index.nav_id)).tolist()
+        free.sort(key=lambda k: rng.rank(self._recipe.seed, "dagger tasks", phase, index.nav_id[k]))
+        return index.take(np.array(sorted(free[: self._recipe.dagger.episodes]), np.int64))
 
     def _collect(self, parts: list[Part], what: str) -> list[Steps]:
         with make_executor("local", self._workers) as executor:
@@ -251,13 +251,13 @@ class _Training:
     def _pool(self, parts: list[Steps]) -> Pool:
         return Pool(parts, self._about.scenes, self._about.vocabulary)
 
-    def _held_out(self, nav_ids: NDArray[np.str_]) -> NDArray[np.bool_]:
+    def _held_out(self, nav_ids: Sequence[str]) -> NDArray[np.bool_]:
         share = self._recipe.data.validation_share * 2.0**64
-        return np.array([rng.rank(self._recipe.seed, "kept back", n) < share for n in nav_ids.tolist()], np.bool_)
+        return np.array([rng.rank(self._recipe.seed, "kept back", n) < share for n in nav_ids], np.bool_)
 
     def _learn(self, parts: list[Steps], phase: int) -> None:
         train, dagger = self._recipe.train, self._recipe.dagger
-        self._rate, self._what = Rate(), {-1: "sight", 0: "imitation"}.get(phase, f"round {phase}")
+        self._rate, self._what = Rate(), _PHASES.get(phase, f"round {phase}")
         if phase < 0 and self._exploration is not None:
             from aerialdojo_gen.learning.imitation import train_patch_classifier
 
@@ -265,7 +265,7 @@ class _Training:
             return
         epochs, rate = (dagger.epochs, dagger.learning_rate) if phase else (train.epochs, train.learning_rate)
         pool = self._pool(parts)
-        self._learner.learn(pool, self._exploration, self._held_out(pool.nav_id), epochs, rate, self)
+        self._learner.learn(pool, self._exploration, self._held_out(pool.nav_id.tolist()), epochs, rate, self)
 
     def on_batch(self, done: int, total: int, loss: float, accuracy: float) -> None:
         per_s, now = self._rate.per_s(done), time.monotonic()

@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.base import rng
 from aerialdojo_gen.base.cli_context import command
 from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.base.names import as_names, check_known
@@ -322,11 +321,6 @@ def sample_evenly(index: Index, limit: int, seed: int) -> NDArray[np.int64]:
     return np.array(
         draw_evenly([scene for _, scene in index.sources], index.nav_id, limit, seed, "learning"), np.int64
     )
-
-
-def sampling_key(seed: int, nav_id: str) -> int:
-    """Return by what `sample_evenly` orders the trajectories of a scene."""
-    return rng.rank(seed, "learning", nav_id)
 
 
 def _chosen(what: str, given: str | Sequence[str], known: Sequence[str]) -> tuple[str, ...]:

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from support import task_files
 
 from aerialdojo_gen.base.errors import ImportRefused
-from aerialdojo_gen.exchange import jsonstream
+from aerialdojo_gen.exchange import records as records_module
 from aerialdojo_gen.exchange.importing import Options, import_benchmark
-from aerialdojo_gen.exchange.jsonstream import records, small_document
+from aerialdojo_gen.exchange.records import records, small_document
 
 values = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text(),
@@ -33,7 +33,7 @@ def test_records_are_what_json_reads_whatever_the_chunks(tmp_path_factory, rows,
     under = path.with_name("under.json")
     under.write_text(json.dumps({"before": [1, {"episodes": 2}], "episodes": expected, "after": "x"}))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(jsonstream, "_CHUNK", chunk)
+        patch.setattr(records_module, "_CHUNK", chunk)
         assert list(records(path)) == expected
         assert list(records(under, "episodes")) == expected
 

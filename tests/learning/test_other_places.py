@@ -31,7 +31,7 @@ from aerialdojo_gen.store.root import open_root
 
 torch = pytest.importorskip("torch", reason="PyTorch is not installed: it is the extra 'train'")
 
-from aerialdojo_gen.learning.localization import UNIT_M  # noqa: E402 - it needs torch
+from aerialdojo_gen.learning.network import UNIT_M  # noqa: E402 - it needs torch
 
 TEXT = """
 name = "sight"

@@ -27,8 +27,7 @@ from aerialdojo_gen.benchmark.episodes import read_run
 from aerialdojo_gen.benchmark.runner import Evaluation, evaluate
 from aerialdojo_gen.benchmark.tasks import Selection
 from aerialdojo_gen.dataset.episode import Episode
-from aerialdojo_gen.learning.collect import collect, parts_of, view_parts
-from aerialdojo_gen.learning.flights import Teacher
+from aerialdojo_gen.learning.collect import Teacher, collect, parts_of, view_parts
 from aerialdojo_gen.learning.index import read_index
 from aerialdojo_gen.learning.labels import odometry
 from aerialdojo_gen.learning.parts import Part
@@ -48,7 +47,7 @@ from aerialdojo_gen.store.schemas.columns import list_of
 
 torch = pytest.importorskip("torch", reason="PyTorch is not installed: it is the extra 'train'")
 
-from aerialdojo_gen.learning.localization import pose_loss  # noqa: E402 - it needs torch
+from aerialdojo_gen.learning.network import pose_loss  # noqa: E402 - it needs torch
 
 POLICY = "policy"
 TEXT = """
@@ -172,9 +171,9 @@ def test_other_pictures_of_the_goals_are_drawn_from_anew(planted, tmp_path):
 def test_references_and_looks_are_not_drawn_again_where_only_the_network_is_another():
     counted = set(code_of("aerialdojo_gen.learning.parts").parts)
     assert "aerialdojo_gen.learning.parts" in counted
-    learned = {"network", "policy", "flights", "imitation", "training"}
+    learned = {"network", "policy", "collect", "imitation", "training"}
     assert not {f"aerialdojo_gen.learning.{module}" for module in learned} & counted
-    assert "aerialdojo_gen.learning.network" in code_of("aerialdojo_gen.learning.flights").parts
+    assert "aerialdojo_gen.learning.network" in code_of("aerialdojo_gen.learning.collect").parts
 
 
 def test_of_more_trajectories_or_other_scenes_what_was_drawn_stays_drawn(smoke, tmp_path, monkeypatch):

@@ -10,15 +10,17 @@ from aerialdojo_gen.learning.encoding import DeadReckoning
 
 torch = pytest.importorskip("torch", reason="PyTorch is not installed: it is the extra 'train'")
 
-from aerialdojo_gen.learning.localization import (  # noqa: E402
+from aerialdojo_gen.learning.network import (  # noqa: E402  # noqa: E402 - it needs torch
     UNIT_M,
     Localization,
     LocalizationOutput,
+    Network,
+    PolicyOutput,
+    Shape,
     directions,
     offset_loss,
     places,
 )
-from aerialdojo_gen.learning.network import Network, PolicyOutput, Shape  # noqa: E402 - it needs torch
 
 T, SCENES = 9, 3
 START, GOAL = np.array([31.0, -12.0, 6.0, 2.3]), np.array([-8.0, 20.0, 9.0])
