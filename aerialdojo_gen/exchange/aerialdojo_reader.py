@@ -12,17 +12,10 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.base.errors import StoreError, UsageError
 from aerialdojo_gen.exchange import aerialdojo_layout as layout
+from aerialdojo_gen.exchange import records
 from aerialdojo_gen.exchange.folder import inside
 from aerialdojo_gen.exchange.frames import WORDS, actions_of
-from aerialdojo_gen.exchange.records import (
-    BadField,
-    Fields,
-    plain,
-    positions_of,
-    quaternions_of,
-    shown,
-    small_document,
-)
+from aerialdojo_gen.exchange.records import BadField, Fields, shown
 from aerialdojo_gen.exchange.task import Context, Instance, Route, Task, digest, picture_at
 from aerialdojo_gen.pipeline.stages.work.build_scenes import parse_name
 
@@ -86,9 +79,8 @@ class Reader:
         trains = record.flag("used-in-train")
         if partition is not None:
             _agree(partition, scene, word, trains)
-        pose = record.child("start_pose")
+        pose, goal = record.child("start_pose"), None
         start = context.upright_pose(pose.position("start_position"), _attitude(pose))
-        goal = None
         if record.has("goal_pose"):
             goal = context.frame.positions_to_world(record.child("goal_pose").position("goal_position"))
         # Where readable names stand beside them, the others are the actors'.
@@ -171,7 +163,7 @@ def _read_trajectory(root: Path, partition: layout.Partition, task: Task, contex
     relative = partition.path / f"{task.source_id}.json"
     label = f"{layout.TRAJECTORIES}/{relative.as_posix()}"
     try:
-        document = Fields(small_document(inside(root, relative.as_posix())), label)
+        document = Fields(records.small_document(inside(root, relative.as_posix())), label)
     except (OSError, ValueError) as error:
         raise BadField("episode_id", f"{label}: {getattr(error, 'strerror', None) or error}") from None
     version = document.text("schema_version")
@@ -234,13 +226,13 @@ def _route(document: Fields, context: Context) -> Route:
             if name not in step:
                 raise BadField(f"{where}.{name}", "is missing")
         more.update(step.keys() - {"action", *_STEP})
-    context.notes.update(f"trajectory[].{plain(name)} has no place in the tables" for name in more)
+    context.notes.update(f"trajectory[].{records.plain(name)} has no place in the tables" for name in more)
     context.notes.update(
         f"trajectory file: {name.split('.')[-1]} has no place in the tables" for name in document.unread()
     )
     positions, quaternions = ([step[name] for step in steps] for name in _STEP)
-    points = positions_of(positions, lambda k: document.path(f"trajectory[{k}].{_STEP[0]}"))
-    attitudes = quaternions_of(quaternions, lambda k: document.path(f"trajectory[{k}].{_STEP[1]}"))
+    points = records.positions_of(positions, lambda k: document.path(f"trajectory[{k}].{_STEP[0]}"))
+    attitudes = records.quaternions_of(quaternions, lambda k: document.path(f"trajectory[{k}].{_STEP[1]}"))
     yaws = context.frame.quaternion_to_world_yaw(attitudes)
     poses = np.column_stack([context.frame.positions_to_world(points), yaws])
     if words[-1] == "stop":

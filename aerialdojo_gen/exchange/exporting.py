@@ -15,7 +15,7 @@ import pyarrow.compute as pc
 
 from aerialdojo_gen.base.cli_context import command
 from aerialdojo_gen.base.errors import StoreError, UsageError
-from aerialdojo_gen.base.names import choose_scenes, unknown
+from aerialdojo_gen.base.names import check_known, choose_scenes
 from aerialdojo_gen.dataset.contents import scenes_in_release
 from aerialdojo_gen.exchange import aerialdojo_layout, aerialdojo_writer, habitat_writer, shape_export
 from aerialdojo_gen.exchange.folder import MARKER, whole_folder, write_marker
@@ -130,8 +130,7 @@ def export_release(
     reporter: Reporter | None = None,
 ) -> dict[str, int]:
     """Write the release in a format of others."""
-    if format_name not in FORMATS:
-        raise UsageError(unknown("no format", format_name, FORMATS))
+    check_known("no format", [format_name], FORMATS)
     if picture_px is not None and (format_name != "aerialdojo" or not (picture_px == 0 or 16 <= picture_px <= 4096)):
         raise UsageError("--picture-size is for --format aerialdojo: 16 to 4096 pixels, or 0 for the release's own")
     if shards and format_name != "aerialdojo":
@@ -188,8 +187,7 @@ def export_shapes(
     reporter: Reporter | None = None,
 ) -> dict[str, int]:
     """Write a point cloud or an occupancy grid of each scene with a mesh; no release is needed."""
-    if format_name not in SHAPES:
-        raise UsageError(unknown("no format", format_name, SHAPES))
+    check_known("no format", [format_name], SHAPES)
     if not points_per_m2 > 0.0 or not np.isfinite(points_per_m2):
         raise UsageError(f"--points-per-m2 is above 0, not {points_per_m2:g}")
     if not _MIN_VOXEL_M <= voxel_m <= _LARGEST_VOXEL_M:

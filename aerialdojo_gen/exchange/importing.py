@@ -13,7 +13,7 @@ from typing import Any, TextIO
 import numpy as np
 
 from aerialdojo_gen.base.errors import ImportRefused, StoreError, UsageError, brief
-from aerialdojo_gen.base.names import unknown
+from aerialdojo_gen.base.names import check_known
 from aerialdojo_gen.exchange import aerialdojo_reader, readers
 from aerialdojo_gen.exchange.folder import whole_folder_below, write_json
 from aerialdojo_gen.exchange.frames import FRAMES, Frame
@@ -201,8 +201,7 @@ def import_benchmark(
 ) -> Report:
     """Import others' task files as tables; for damaged files, or bad records that are not skipped, write nothing."""
     options = options or Options()
-    if format_name not in FORMATS:
-        raise UsageError(unknown("no format", format_name, FORMATS))
+    check_known("no format", [format_name], FORMATS)
     chosen = FORMATS[format_name]
     frame = _frame(format_name, chosen, options.frame)
     if options.angles not in ("radians", "degrees", "mixed"):

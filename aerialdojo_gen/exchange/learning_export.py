@@ -7,6 +7,7 @@ import json
 import shutil
 import time
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -87,9 +88,9 @@ def export_for_learning(
         left = [part for part in parts if not unfinished.part(part.number).is_dir()]
         if unfinished.resumed:
             progress.line(f"going on: {len(parts) - len(left)} of {len(parts)} parts are finished")
-        jobs = [_Job(format_name, root.url, options, part, unfinished.part(part.number)) for part in left]
-        with progress.bar("export", len(jobs), "parts") as bar, make_executor("local", workers) as pool:
-            for outcome in pool.map(_write, jobs, lambda job: job.part.scene):
+        write = partial(_write, format_name, root.url, options, unfinished)
+        with progress.bar("export", len(left), "parts") as bar, make_executor("local", workers) as pool:
+            for outcome in pool.map(write, left, lambda part: part.scene):
                 if isinstance(outcome, AerialDojoError):
                     raise outcome
                 bar.advance(frames=outcome)
@@ -146,25 +147,10 @@ def _writer(format_name: str, options: ExportOptions) -> ModuleType:
     return WRITERS[format_name]
 
 
-@dataclass(frozen=True, eq=False)
-class _Job:
-    """A part to be written, wherever."""
-
-    format_name: str
-    data: str
-    options: ExportOptions
-    part: Part
-    place: Path  # Of its folder among the finished parts
-
-    @property
-    def label(self) -> str:
-        return f"part {self.part.number} of {self.part.scene}"
-
-
-def _write(job: _Job) -> int:
-    with atomic_folder(job.place, job.place.parents[1]) as folder:
-        WRITERS[job.format_name].write_part(open_root(job.data), job.part, job.options, folder)
-    return job.part.frames
+def _write(format_name: str, data: str, options: ExportOptions, unfinished: PartialExport, part: Part) -> int:
+    with atomic_folder(unfinished.part(part.number), unfinished.folder) as folder:
+        WRITERS[format_name].write_part(open_root(data), part, options, folder)
+    return part.frames
 
 
 def _request(format_name: str, root: DataRoot, options: ExportOptions, parts: list[Part]) -> dict[str, Any]:

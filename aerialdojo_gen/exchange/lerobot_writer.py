@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import math
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -127,34 +128,22 @@ _OPTIONS = {
 }  # fmt: skip
 
 
-class Clip:
-    """Writes a video frame by frame, at even intervals; a context manager."""
-
-    def __init__(self, path: Path, kind: str, width: int, height: int, fps: int) -> None:
-        codec, pixels, options = _OPTIONS[kind]
-        # Without bitexact the muxer writes the library's version into every file.
-        self._container = av.open(str(path), "w", format="mp4", options={"fflags": "+bitexact"})
-        stream: Any = self._container.add_stream(codec, rate=Fraction(fps), options=options)
+@contextmanager
+def clip(path: Path, kind: str, width: int, height: int) -> Iterator[Callable[[NDArray[Any]], None]]:
+    """Yield what appends a frame to a video, at even intervals; where the block fails the file stays unfinished."""
+    codec, pixels, options = _OPTIONS[kind]
+    # Without bitexact the muxer writes the library's version into every file.
+    with av.open(str(path), "w", format="mp4", options={"fflags": "+bitexact"}) as container:
+        stream: Any = container.add_stream(codec, rate=Fraction(FPS), options=options)
         stream.width, stream.height, stream.pix_fmt = width, height, pixels
         stream.codec_context.thread_count = 1
-        self._stream, self._format = stream, "rgb24" if kind == "rgb" else pixels
 
-    def write(self, frame: NDArray[Any]) -> None:
-        """Append a frame."""
-        picture = av.VideoFrame.from_ndarray(np.ascontiguousarray(frame), format=self._format)
-        for packet in self._stream.encode(picture):
-            self._container.mux(packet)
+        def write(frame: NDArray[Any]) -> None:
+            form = "rgb24" if kind == "rgb" else pixels
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(np.ascontiguousarray(frame), format=form)))
 
-    def __enter__(self) -> Clip:
-        """Return itself."""
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        """Finish the file, or only close it where the block failed."""
-        if kind is None:
-            for packet in self._stream.encode():
-                self._container.mux(packet)
-        self._container.close()
+        yield write
+        container.mux(stream.encode())
 
 
 def depth_codes(depth_m: NDArray[np.float32], most_m: float) -> NDArray[np.uint16]:
@@ -218,13 +207,13 @@ def write_part(root: DataRoot, part: Part, options: ExportOptions, folder: Path)
     with ExitStack() as stack:
         s = options.sensors
         clips = {
-            key: stack.enter_context(Clip(folder / f"{key}.mp4", kind, s.width, s.height, FPS))
+            key: stack.enter_context(clip(folder / f"{key}.mp4", kind, s.width, s.height))
             for key, kind in video_kinds(options).items()
         }
         sample_frames = SampleFrames(root, part, options)
         for k in range(len(part.index)):
             frames.append(_columns(part, k))
-            counts = _write_videos(sample_frames, k, options, clips, part)
+            counts = _write_videos(sample_frames, k, options, clips)
             episodes.append({name: row_stats(values) for name, values in frames[-1].items()})
             episodes[-1] |= _describe_counts(counts, options, int(part.index.steps[k]))
             for key, found in counts.items():
@@ -259,7 +248,7 @@ def _columns(part: Part, k: int) -> dict[str, NDArray[Any]]:
 
 
 def _write_videos(
-    sample_frames: SampleFrames, k: int, options: ExportOptions, clips: dict[str, Clip], part: Part
+    sample_frames: SampleFrames, k: int, options: ExportOptions, clips: Mapping[str, Callable[[NDArray[Any]], None]]
 ) -> Counts:
     """Write what a trajectory sees into the videos, and count its values."""
     s = options.sensors
@@ -270,7 +259,7 @@ def _write_videos(
         counts[key] += times * np.stack([_counted(one, counts[key].shape[1]) for one in channels])
         for frame in frames:
             for _ in range(times):
-                clips[key].write(frame)
+                clips[key](frame)
 
     for _, frames in sample_frames.frames(k):
         for v, view in enumerate(s.views):
@@ -279,7 +268,7 @@ def _write_videos(
             if "depth_m" in frames:
                 write(depth_key(view), depth_codes(frames["depth_m"][:, v], s.max_depth_m))
     if GOAL in clips:
-        write(GOAL, sample_frames.goal(k)[None], int(part.index.steps[k]))
+        write(GOAL, sample_frames.goal(k)[None], int(sample_frames.part.index.steps[k]))
     return counts
 
 

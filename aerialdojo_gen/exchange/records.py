@@ -264,7 +264,7 @@ class _Text:
 
     def members(self, brackets: str, expected: str) -> Iterator[int]:
         """Stop before each member of a list or an object, with its number; who goes on has used it."""
-        opening, closing = brackets
+        opening, closing = tuple(brackets)
         if self.peek() != opening:
             raise self.fail(f"expected {expected}")
         self.take(opening)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.base.errors import UsageError
-from aerialdojo_gen.base.names import unknown
+from aerialdojo_gen.base.names import check_known
 from aerialdojo_gen.benchmark.agents.goal import Sensors
 from aerialdojo_gen.benchmark.observations import renderer_name
 from aerialdojo_gen.benchmark.tasks import Selection, mesh_of, reference_image, select
@@ -50,11 +50,8 @@ class ExportOptions:
             raise UsageError(f"a limit is 0, for all, or more, not {self.limit}")
         object.__setattr__(self, "renderer", "" if self.source == "recordings" else renderer_name(self.renderer))
         object.__setattr__(self, "splits", Selection(self.splits).splits)
-        for name in self.goal:
-            if name not in GOALS:
-                raise UsageError(unknown("no goal", name, GOALS))
-        if self.source not in SOURCES:
-            raise UsageError(unknown("no source", self.source, SOURCES))
+        check_known("no goal", self.goal, GOALS)
+        check_known("no source", [self.source], SOURCES)
         if not self.goal:
             raise UsageError(f"a goal is given by {' or '.join(GOALS)}: name one")
         if not self.sensors.views or not (self.sensors.rgb or self.sensors.depth):
@@ -82,6 +79,11 @@ class Part:
     def scene(self) -> str:
         """Name of its scene."""
         return self.index.scenes[0]
+
+    @property
+    def label(self) -> str:
+        """Name it in messages."""
+        return f"part {self.number} of {self.scene}"
 
     @property
     def frames(self) -> int:
@@ -143,7 +145,7 @@ class SampleFrames:
     """What the trajectories of a part see, and what their goals look like."""
 
     def __init__(self, root: DataRoot, part: Part, options: ExportOptions) -> None:
-        self._root, self._part, self._sensors = root, part, options.sensors
+        self._root, self.part, self._sensors = root, part, options.sensors
         self._source: Source = RenderedFrames(part.index, options.sensors, options.renderer)
         if options.source != "render":
             self._source = RecordedFrames(part.index, options.sensors, self._source)
@@ -151,7 +153,7 @@ class SampleFrames:
     def frames(self, k: int) -> Iterator[tuple[int, Frames]]:
         """Yield the pictures of trajectory k, some steps at a time, with the first of these steps."""
         s = self._sensors
-        n = int(self._part.index.steps[k])
+        n = int(self.part.index.steps[k])
         size = max(1, _PIXELS // (len(s.views) * s.height * s.width))
         for begin in range(0, n, size):
             steps = np.arange(begin, min(begin + size, n))
@@ -160,10 +162,10 @@ class SampleFrames:
     def goal(self, k: int) -> NDArray[np.uint8]:
         """Return trajectory k's goal picture, (H, W, 3) uint8, as large as the views'; black where there is none."""
         s = self._sensors
-        named = self._part.index.goal_columns["reference_image_id"][k]
+        named = self.part.index.goal_columns["reference_image_id"][k]
         if named is None:
             return np.zeros((s.height, s.width, 3), np.uint8)
-        picture = reference_image(self._root, self._part.scene, named)
+        picture = reference_image(self._root, self.part.scene, named)
         shrinks = picture.shape[0] >= s.height and picture.shape[1] >= s.width
         how = cv2.INTER_AREA if shrinks else cv2.INTER_LINEAR
         return np.asarray(cv2.resize(picture, (s.width, s.height), interpolation=how), np.uint8)

@@ -35,7 +35,6 @@ from aerialdojo_gen.learning.steps import Steps, is_written, read_steps
 from aerialdojo_gen.learning.words import Vocabulary
 from aerialdojo_gen.pipeline.code_digest import code_of
 from aerialdojo_gen.pipeline.executors import Executor
-from aerialdojo_gen.pipeline.executors.channels import WorkerChannel
 from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.planning.difficulty import agent_actions
 from aerialdojo_gen.planning.flight_space import FlightSpace
@@ -162,9 +161,8 @@ def _encoded_goal(
 ) -> Any:  # fmt: skip
     shown = shown | ~columns["semantic"][rows]
     images = scatter_rows(columns["images"][columns["image"][rows[shown]]], shown)
-    tokens = np.array(
-        [vocabulary.encode(text) for text in columns["text"][rows, 1 - shown.astype(np.int64)].tolist()]
-    )
+    texts = columns["text"][rows, 1 - shown.astype(np.int64)].tolist()
+    tokens = np.array([vocabulary.encode(text) for text in texts])
     return network.encode_goal(torch.from_numpy(tokens), torch.from_numpy(images), torch.from_numpy(shown))
 
 
@@ -280,14 +278,11 @@ def collect(parts: Sequence[Part], executor: Executor, reporter: Reporter, what:
     return [read_steps(part.folder) for part in parts]
 
 
-def make_part(part: Part, link: WorkerChannel | None = None) -> int:
+def make_part(part: Part) -> int:
     """Make one part and write it; return how many trajectories it has."""
-    del link
     if part.exploration is not None:
         steps = part_data.collect_views(part, part.exploration)
-    elif part.dagger_round is None:
-        steps = part_data.references(part)
     else:
-        steps = flights(part, part.dagger_round)
+        steps = flights(part, part.dagger_round) if part.dagger_round else part_data.references(part)
     steps.write(part.folder)
     return len(part)

@@ -15,7 +15,6 @@ import os
 import struct
 import zlib
 from collections import defaultdict
-from collections.abc import Sequence
 from dataclasses import asdict
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -73,8 +72,7 @@ class CachedFrames:
                 drawn = take(whole, steps[rows])
             else:
                 drawn = self._source.frames(trajectories[rows], steps[rows])
-            for name, images in drawn.items():
-                out[name][rows] = images
+            put(out, rows, drawn)
         return out
 
     @property
@@ -116,20 +114,17 @@ class CachedFrames:
         return True
 
     def _unpack(self, packed: bytes, row: int, out: Frames) -> None:
-        sizes = {name: seen[row].nbytes for name, seen in out.items()}
-        plain = np.frombuffer(self._codec.decompress(packed, sum(sizes.values())), np.uint8)
-        if "rgb" in out:
-            out["rgb"][row] = plain[: sizes["rgb"]].reshape(out["rgb"][row].shape)
-        if "depth_m" in out:
-            # The bytes of one significance together, which are alike: see `_pack`.
-            planes = np.ascontiguousarray(plain[-sizes["depth_m"] :].reshape(4, -1).T)
-            out["depth_m"][row] = planes.view("<f4").reshape(out["depth_m"][row].shape)
+        rest = np.frombuffer(self._codec.decompress(packed, sum(one[row].nbytes for one in out.values())), np.uint8)
+        for one in out.values():
+            planes, rest = np.split(rest, [one[row].nbytes])
+            values = np.ascontiguousarray(planes.reshape(one.itemsize, -1).T)
+            one[row] = values.view(one.dtype).reshape(one[row].shape)
 
     def _pack(self, frames: Frames, row: int) -> bytes:
-        parts = [frames["rgb"][row].tobytes()] if "rgb" in frames else []
-        if "depth_m" in frames:
-            parts.append(frames["depth_m"][row].astype("<f4").view(np.uint8).reshape(-1, 4).T.tobytes())
-        return bytes(self._codec.compress(b"".join(parts), asbytes=True))
+        # The bytes of one significance together, which are alike.
+        values = (np.ascontiguousarray(one[row]) for one in frames.values())
+        planes = (of.view(np.uint8).reshape(-1, of.itemsize).T.tobytes() for of in values)
+        return bytes(self._codec.compress(b"".join(planes), asbytes=True))
 
     def _write(self, k: int, frames: Frames) -> None:
         packed = [self._pack(frames, row) for row in range(int(self._index.steps[k]))]
@@ -172,9 +167,10 @@ def take(frames: Frames, rows: NDArray[np.int64]) -> Frames:
     return {name: seen[rows] for name, seen in frames.items()}
 
 
-def join(parts: Sequence[Frames]) -> Frames:
-    """Join poses, in their order."""
-    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+def put(out: Frames, rows: NDArray[np.int64], frames: Frames) -> None:
+    """Give poses their rows."""
+    for name, images in frames.items():
+        out[name][rows] = images
 
 
 def empty_frames(sensors: Sensors, n: int) -> Frames:
@@ -205,8 +201,8 @@ class RenderedFrames:
         poses = {int(k): index.poses_of(int(k)) for k in np.unique(trajectories)}
         at = np.stack([poses[k][s] for k, s in zip(trajectories.tolist(), steps.tolist(), strict=True)])
         rgb, depth_m = draw_bodies(renderer_for(context.scene, self._renderer), sensors.camera, at, sensors.views)
-        images = {"rgb": rgb} if sensors.rgb else {}
-        return images | ({"depth_m": clip_depth(depth_m, sensors)} if sensors.depth else {})
+        images = {"rgb": rgb, "depth_m": clip_depth(depth_m, sensors)}
+        return {name: images[name] for name in empty_frames(sensors, 0)}
 
 
 class RecordedFrames:
@@ -234,23 +230,19 @@ class RecordedFrames:
         out = empty_frames(self._sensors, len(steps))
         for rows, read in ((order[known[order]], self._read), (order[~known[order]], self._drawn.frames)):
             if len(rows):
-                for name, seen in read(trajectories[rows], steps[rows]).items():
-                    out[name][rows] = seen
+                put(out, rows, read(trajectories[rows], steps[rows]))
         return out
 
     def _read(self, trajectories: NDArray[np.int64], steps: NDArray[np.int64]) -> Frames:
         index, s = self._index, self._sensors
         out = empty_frames(s, len(steps))
+        # Of depth the nearest value, not a mean: between two surfaces there is none.
+        ways = {"rgb": cv2.INTER_AREA, "depth_m": cv2.INTER_NEAREST_EXACT}
         for row, (k, step) in enumerate(zip(trajectories.tolist(), steps.tolist(), strict=True)):
             root, scene = index.sources[k]
             recording = _recording(root, f"media/{scene}/{index.nav_id[k]}")
-            for v, view in enumerate(s.views):
-                if s.rgb:
-                    out["rgb"][row, v] = _smaller(recording.rgb[view][step], s, cv2.INTER_AREA)
-                if s.depth:
-                    # The nearest value, not a mean: between two surfaces there is none.
-                    depth_m = recording.depth_m[view][step]
-                    out["depth_m"][row, v] = _smaller(depth_m, s, cv2.INTER_NEAREST_EXACT)
+            for (v, view), name in itertools.product(enumerate(s.views), out):
+                out[name][row, v] = _smaller(getattr(recording, name)[view][step], s, ways[name])
         if s.depth:
             clip_depth(out["depth_m"], s)
         return out

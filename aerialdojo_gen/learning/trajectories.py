@@ -19,18 +19,10 @@ from aerialdojo_gen.base.names import as_names, check_known
 from aerialdojo_gen.benchmark.agents.goal import Sensors
 from aerialdojo_gen.benchmark.tasks import Selection, draw_evenly, mesh_of, reference_image
 from aerialdojo_gen.benchmark.worlds import make_worlds
+from aerialdojo_gen.learning import pictures
 from aerialdojo_gen.learning.index import Index, read_indices
 from aerialdojo_gen.learning.labels import PRIVILEGED, labels_at, scatter_rows, split_batch
 from aerialdojo_gen.learning.loader import Order
-from aerialdojo_gen.learning.pictures import (
-    CachedFrames,
-    Frames,
-    RecordedFrames,
-    RenderedFrames,
-    Source,
-    join,
-    take,
-)
 from aerialdojo_gen.learning.words import Vocabulary
 from aerialdojo_gen.store.cache import cache_folder
 from aerialdojo_gen.store.root import DataRoot, Where, open_root
@@ -170,21 +162,21 @@ class Trajectories:
         self.vocabulary = own.vocabulary or Vocabulary.of(self._texts)
         self.fingerprint = self._fingerprint()
 
-    def _open_source(self, own: SampleOptions) -> Source:
+    def _open_source(self, own: SampleOptions) -> pictures.Source:
         """Open where pictures come from; of recordings alone only the trajectories that have one are kept."""
         # A scene without a mesh is named before the first epoch, not within it.
         for scene, root in self.index.roots.items():
             mesh_of(root, scene)
         if own.source == "recordings":
             self.index = recorded_alone(self.index, self.sensors, "source='render'")
-        source: Source = RenderedFrames(self.index, self.sensors, own.renderer)
+        source: pictures.Source = pictures.RenderedFrames(self.index, self.sensors, own.renderer)
         if own.source != "render":
-            source = RecordedFrames(self.index, self.sensors, source)
+            source = pictures.RecordedFrames(self.index, self.sensors, source)
         if not own.cache_gb:
             return source
         base = Path(own.cache_dir) if own.cache_dir is not None else cache_folder() / "learning"
         most_bytes = int(own.cache_gb * 1e9)
-        return CachedFrames(source, self.index, self.sensors, base, most_bytes, own.source, own.renderer)
+        return pictures.CachedFrames(source, self.index, self.sensors, base, most_bytes, own.source, own.renderer)
 
     def __len__(self) -> int:
         """Return the number of samples."""
@@ -268,15 +260,16 @@ class Trajectories:
                 return np.zeros_like(reference_image(*source, image_id))
         return np.zeros((0, 0, 3), np.uint8)
 
-    def _frames(self, trajectories: NDArray[np.int64], steps: NDArray[np.int64]) -> Frames:
+    def _frames(self, trajectories: NDArray[np.int64], steps: NDArray[np.int64]) -> pictures.Frames:
         if self._source is None:
             return {}
         # Windows overlap: what two samples of a batch share is drawn once, a scene after the other.
-        keys, back = np.unique(
-            np.stack([self.index.scene[trajectories], trajectories, steps]), axis=1, return_inverse=True
-        )
-        parts = [self._source.frames(*keys[1:, keys[0] == scene].astype(np.int64)) for scene in np.unique(keys[0])]
-        return take(join(parts), np.asarray(back, np.int64).ravel())
+        keys = np.stack([self.index.scene[trajectories], trajectories, steps])
+        (scenes, *drawn), back = np.unique(keys, axis=1, return_inverse=True)
+        out = pictures.empty_frames(self.sensors, len(scenes))
+        for rows in (np.flatnonzero(scenes == scene) for scene in np.unique(scenes)):
+            pictures.put(out, rows, self._source.frames(*(of[rows].astype(np.int64) for of in drawn)))
+        return pictures.take(out, np.asarray(back, np.int64).ravel())
 
     def _fingerprint(self) -> str:
         s = self.sensors
@@ -304,7 +297,7 @@ def _roots(
 
 def recorded_alone(index: Index, sensors: Sensors, else_: str) -> Index:
     """Keep the trajectories that have a recording; UsageError, which names what to choose else, without any."""
-    recorded = RecordedFrames(index, sensors, RenderedFrames(index, sensors, "auto"))
+    recorded = pictures.RecordedFrames(index, sensors, pictures.RenderedFrames(index, sensors, "auto"))
     has = np.flatnonzero([recorded.has(k) for k in range(len(index))])
     if not len(has):
         raise UsageError(

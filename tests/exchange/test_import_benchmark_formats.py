@@ -79,9 +79,9 @@ def test_cityavos(tmp_path):
     assert json.loads((tmp_path / "imported/east/import.json").read_text())["frame"] == "esd"
     # Pictures left aside, and elsewhere.
     missions, elsewhere = task_files.cityavos(tmp_path / "elsewhere", 3), tmp_path / "elsewhere"
-    kinds = {("semantic",): Options("ned", with_pictures=False), ("image", "semantic"): Options("ned", pictures=elsewhere)}
-    for modalities, options in kinds.items():
-        _, tasks, *_ = imported(tmp_path, "cityavos", missions, options, force=True)
+    ways = {("semantic",): {"with_pictures": False}, ("image", "semantic"): {"pictures": elsewhere}}
+    for modalities, way in ways.items():
+        _, tasks, *_ = imported(tmp_path, "cityavos", missions, Options("ned", **way), force=True)
         assert tasks["modality"].tolist() == [*modalities] * 3
 
 

@@ -1,6 +1,7 @@
 """Policies in places that they have no map of: what objects look like, and weights that are taken elsewhere."""
 
 import json
+from collections import Counter
 from functools import partial
 
 import numpy as np
@@ -115,58 +116,55 @@ def test_killed_while_it_learns_to_see_it_goes_on_and_ends_the_same(smoke, cache
     assert_same_training(learned, train_here(smoke, recipe(), out, cache).policy)
 
 
-class CountedSearch(Search):
-    """The search, with its calls counted."""
-
-    looked = led = 0
-
-    def observe(self, log_chances, pictures, odometry):
-        CountedSearch.looked += 1
-        assert np.allclose(np.exp(log_chances).sum(axis=1), 1.0, atol=1e-4)
-        super().observe(log_chances, pictures, odometry)
-
-    def towards(self, odometry, remaining):
-        CountedSearch.led += 1
-        return super().towards(odometry, remaining)
-
-
 @pytest.fixture
-def lost_from(monkeypatch):
-    """Set how unsure of its place a policy has to be, in nats, to search."""
+def calls(monkeypatch):
+    """The calls of the search, counted."""
+    calls = Counter()
+
+    class CountedSearch(Search):
+        def observe(self, log_chances, pictures, odometry):
+            calls["observe"] += 1
+            assert np.allclose(np.exp(log_chances).sum(axis=1), 1.0, atol=1e-4)
+            super().observe(log_chances, pictures, odometry)
+
+        def towards(self, odometry, remaining):
+            calls["towards"] += 1
+            return super().towards(odometry, remaining)
+
     monkeypatch.setattr("aerialdojo_gen.learning.policy.Search", CountedSearch)
-    monkeypatch.setattr(CountedSearch, "looked", 0)
-    monkeypatch.setattr(CountedSearch, "led", 0)
-    return lambda nats: monkeypatch.setattr("aerialdojo_gen.learning.policy.LOST_NATS", nats)
+    return calls
 
 
-@pytest.mark.parametrize("lost", [True, False])
-def test_the_search_leads_where_the_place_is_not_known_and_nowhere_else(smoke, learned, tmp_path, lost_from, lost):
-    lost_from(-1.0 if lost else np.inf)
-    chosen = Selection(("id_train",), limit=4)
-    evaluate(smoke, Evaluation("lost", "policy", {"weights": str(learned)}, chosen), out=tmp_path, workers=1)
-    rows = read_run(tmp_path, "lost").to_pylist()
-    if lost:
-        assert CountedSearch.led == CountedSearch.looked >= len(rows) > 0
-    else:
-        assert (CountedSearch.led, CountedSearch.looked) == (0, 0)
-        assert any(row["n_actions"] > 1 for row in rows)
+def set_lost_from(monkeypatch, nats):
+    """How unsure of its place a policy has to be to search."""
+    monkeypatch.setattr("aerialdojo_gen.learning.policy.LOST_NATS", nats)
 
 
-def test_who_finds_out_late_that_it_is_lost_searches_what_it_saw_before(learned, lost_from):
-    lost_from(np.inf)
+def test_the_search_leads_where_the_place_is_not_known_and_nowhere_else(smoke, learned, tmp_path, calls, monkeypatch):
+    for name, nats in (("known", np.inf), ("lost", -1.0)):
+        assert not calls
+        set_lost_from(monkeypatch, nats)
+        chosen = Selection(("id_train",), limit=4)
+        evaluate(smoke, Evaluation(name, "policy", {"weights": str(learned)}, chosen), out=tmp_path, workers=1)
+    assert any(n > 1 for n in read_run(tmp_path, "known")["n_actions"].to_pylist())
+    assert calls["observe"] == calls["towards"] >= read_run(tmp_path, "lost").num_rows > 0
+
+
+def test_who_finds_out_late_that_it_is_lost_searches_what_it_saw_before(learned, calls, monkeypatch):
+    set_lost_from(monkeypatch, np.inf)
     policy, draw = Policy(str(learned)), np.random.default_rng(0)
     policy.reset(
         Goal("semantic", "red van", "clock tower", "north", "A red van.", None, Rules(90, sensors=policy.sensors))
     )
     for step in range(7):
         if step == 5:
-            assert CountedSearch.looked == 0
-            lost_from(-1.0)
+            assert not calls
+            set_lost_from(monkeypatch, -1.0)
         rgb = {view: draw.integers(0, 256, (32, 32, 3), np.uint8) for view in policy.sensors.views}
         depth_m = {view: draw.uniform(1.0, 20.0, (32, 32)).astype(np.float32) for view in policy.sensors.views}
         assert 0 <= policy.act(Observation(step, 90 - step, rgb=rgb, depth_m=depth_m)) < 16
     # The five of before, and one at each step since.
-    assert CountedSearch.looked == 7
+    assert calls["observe"] == 7
 
 
 def test_a_guess_that_is_led_is_where_it_was_led_to(sightless):
@@ -180,10 +178,6 @@ def test_a_guess_that_is_led_is_where_it_was_led_to(sightless):
         assert torch.allclose(led.offset * UNIT_M, away_m)
         one, two = (net.choose(seen, one).logits for one in (guess, led))
         assert not torch.allclose(one, two)
-
-
-def same(a, b):
-    return torch.allclose(a, b, rtol=0.0, atol=1e-5)
 
 
 def guess(network, seen, goal):
@@ -220,7 +214,7 @@ def test_adapted_weights_begin_as_the_given_ones(learned, adapted):
             (choice.blocked, choice_after.blocked), (words[..., :-1], words_after[..., : len(old.named)]),
             (words[..., -1], words_after[..., -1]),  # the last is of no object
         ):  # fmt: skip
-            assert same(a, b)
+            assert torch.allclose(a, b, rtol=0.0, atol=1e-5)
 
 
 def test_a_training_goes_on_from_where_the_given_weights_are(smoke, cache, learned, tmp_path):

@@ -2,13 +2,16 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
 import pytest
+from scipy.stats import binomtest
 from support.extended import set_columns
 from support.flying import free_poses, town
 from support.trainings import (
@@ -28,9 +31,10 @@ from aerialdojo_gen.benchmark.runner import Evaluation, evaluate
 from aerialdojo_gen.benchmark.tasks import Selection
 from aerialdojo_gen.dataset.episode import Episode
 from aerialdojo_gen.learning.collect import Teacher, collect, parts_of, view_parts
+from aerialdojo_gen.learning.encoding import DeadReckoning
 from aerialdojo_gen.learning.index import read_index
-from aerialdojo_gen.learning.labels import odometry
-from aerialdojo_gen.learning.parts import Part
+from aerialdojo_gen.learning.labels import odometry, to_body_frame
+from aerialdojo_gen.learning.parts import Part, pictures
 from aerialdojo_gen.learning.policy import Policy, read_weights
 from aerialdojo_gen.learning.recipe import load_recipe
 from aerialdojo_gen.learning.steps import read_steps
@@ -345,3 +349,60 @@ def test_without_torch_there_is_one_line(smoke, tmp_path):
     done = subprocess.run(command, capture_output=True, text=True, env=env, check=False)
     assert done.returncode == 1
     assert done.stderr == "error: train lacks the package torch: pip install 'aerialdojo-gen[train]'\n"
+
+
+def flown(root, net, sensors, index, k, led):
+    """Fly a task, told the goal's offset at every step or not; say whether it ends at the goal."""
+    part = Part(root, ("id_test",), (), sensors, "gl", root.path, scene=index.scenes[0])
+    episode = Episode(part.space, tuple(index.start[k]), tuple(index.goal[k]), int(index.budget[k]))
+    reckoning, goal, memory = DeadReckoning(), torch.zeros(1, net.shape.features), net.blank(1)
+    step = torch.ones((1, 1), dtype=torch.bool)
+    while episode.termination is None:
+        pose = np.array([[*episode.position, episode.yaw_rad]])
+        seen = net.features(torch.from_numpy(pictures(part, pose)), goal, step)
+        guess, memory = net.whereabouts(seen, goal, torch.from_numpy(reckoning.odometry[None, None]), memory)
+        if led:
+            guess = guess.with_goal_offset(torch.from_numpy(to_body_frame(pose, index.goal[k : k + 1]))[None].float())
+        action = int(net.choose(seen, guess).actions(torch.from_numpy(reckoning.back[None, None]))[0, 0])
+        episode.step(action)
+        reckoning.add(action, episode.refused)
+    return episode.success(3.0)
+
+
+@pytest.mark.nightly
+def test_told_where_goals_are_it_flies_there_though_its_map_knows_nothing(smoke, tmp_path):
+    root = open_root(smoke)
+    # The map learns nothing: where the goal is, is told or not known at all.
+    thorough = {
+        "epochs": 16,
+        "batch_steps": 256,
+        "learning_rate": 3e-3,
+        "goal_weight": 0.0,
+        "looks": 256,
+        "checkpoint_s": 60,
+    }
+    data = {"views": ["front", "down"], "limit": None, "validation_share": 0.02}
+    own = recipe(data=data, model=LARGER | {"word_features": 16}, train=thorough)
+    policy = train_here(smoke, own, tmp_path / "out", tmp_path / "cache").policy
+    net, about = network(policy), read_weights(policy)[1]
+    index = read_index(root, Selection(("id_test",)))
+    rows = np.linspace(0, len(index) - 1, min(len(index), 40)).astype(int)
+    with torch.inference_mode():
+        told, untold = ([flown(root, net, about.sensors, index, k, led) for k in rows] for led in (True, False))
+    # 18 and 0 of 39 as measured; a choice that learned beside its own guess ended none when told.
+    assert np.mean(told) > 0.25
+    assert np.mean(untold) < 0.1
+
+
+@pytest.mark.slow
+def test_the_weights_of_the_baseline_do_as_well_as_readme_says(project, tmp_path):
+    """Flown where they and the whole release are here."""
+    data = Path(os.environ.get("AERIALDOJO_DATA") or project / "data")
+    weights = data / "policies" / "imitation" / "policy.safetensors"
+    if not weights.is_file():
+        pytest.skip(f"there are no weights of train imitation in {data}")
+    row = re.search(r"^\| imitation and DAgger \| ([\d.]+) \[", (project / "README.md").read_text(), re.MULTILINE)
+    selection = Selection(("id_test",), ("base",), limit=40)
+    flown = evaluate(data, Evaluation("row", "policy", {"weights": str(weights)}, selection), out=tmp_path, workers=2)
+    assert flown.finished == 40
+    assert binomtest(flown.successes, 40, float(row[1]) / 100).pvalue > 0.001, f"{flown.successes} of 40"

@@ -252,12 +252,13 @@ def test_recordings_are_read_where_they_are(smoke):
 
 
 def test_a_release_without_recordings_or_without_meshes_is_named(planted):
-    with pytest.raises(UsageError, match="aerialdojo-gen render"):
-        Trajectories(planted.data, split="all", source="recordings")
-    shutil.rmtree(planted.data / "meshes")
+    meshes = (planted.data / "meshes").rename(planted.data / "elsewhere")
     with pytest.raises(StoreError, match=r"the mesh .*U_Courtyard_0.*is missing: run aerialdojo-gen build-scenes"):
         Trajectories(planted.data, split="all")
     assert len(Trajectories(planted.data, split="all", views=())) > 0, "who sees nothing needs none"
+    meshes.rename(planted.data / "meshes")
+    with pytest.raises(UsageError, match="aerialdojo-gen render"):
+        Trajectories(planted.data, split="all", source="recordings")
 
 
 def test_a_selection_keeps_to_the_split_by_objects_and_to_its_limit(smoke):
