@@ -127,12 +127,12 @@ def write_scene(data: DataRoot, scene: str, root: Path, picture_px: int = 0) -> 
         routes = store.read_scene(data, f"routes/{subset}", scene)
         for setting in layout.SETTING_WORDS:
             chosen = routes.filter(pa.compute.equal(routes["setting"], setting)).sort_by("nav_id")
-            mine = tasks.filter(pa.compute.equal(tasks["setting"], setting)).sort_by("nav_id").to_pylist()
+            own = tasks.filter(pa.compute.equal(tasks["setting"], setting)).sort_by("nav_id").to_pylist()
             partition = layout.partition_of(scene, setting, store.partition(scene).upper(), subset)
             # Episodes are numbered by their places in the table.
             ends = {row["nav_id"]: (str(k), row) for k, row in enumerate(chosen.select(_ENDS).to_pylist())}
             for kind, modality in layout.KINDS.items():
-                rows = [row for row in mine if row["modality"] == modality]
+                rows = [row for row in own if row["modality"] == modality]
                 folder = root / kind / partition.path
                 folder.mkdir(parents=True)
                 lines = ",\n".join(_text(_task(row, *ends[row["nav_id"]], pictures, folder)) for row in rows)

@@ -193,7 +193,13 @@ def export_shapes(
     if not _MIN_VOXEL_M <= voxel_m <= _LARGEST_VOXEL_M:
         raise UsageError(f"--voxel-m is {_MIN_VOXEL_M:g} to {_LARGEST_VOXEL_M:g} metres, not {voxel_m:g}")
     root = open_root(data)
-    chosen = choose_scenes(scenes, _scenes_with_mesh(root))
+    names = sorted(filter(is_plain, (PurePosixPath(path).stem for path in root.list("meshes", "*.glb"))))
+    if not names:
+        raise StoreError(
+            f"there is no mesh in {root.at('meshes')}: name another folder with --data, or make meshes with "
+            f"{command('build-scenes')}"
+        )
+    chosen = choose_scenes(scenes, names)
     meshes = {name: root.digest(f"meshes/{name}.glb") for name in chosen}
     with whole_folder(out, MARKER, force=force) as folder:
 
@@ -208,16 +214,6 @@ def export_shapes(
         frame = "east, north, up, metres"
         write_marker(folder, format_name, frame, **own, scenes=chosen, mesh_sha256=meshes, counts=counts)
     return counts
-
-
-def _scenes_with_mesh(root: DataRoot) -> list[str]:
-    names = sorted(filter(is_plain, (PurePosixPath(path).stem for path in root.list("meshes", "*.glb"))))
-    if not names:
-        raise StoreError(
-            f"there is no mesh in {root.at('meshes')}: name another folder with --data, or make meshes with "
-            f"{command('build-scenes')}"
-        )
-    return names
 
 
 def _write_scenes(

@@ -109,8 +109,8 @@ class Hub:
         return AerialDojoError(f"{self.address} answers {status}: {self._line(error)}; try again later")
 
     def _line(self, error: BaseException) -> str:
-        said = getattr(error, "server_message", None)
-        return Secrets().text(brief(str(said), 160) if said else base_errors.first_line(error))
+        message = getattr(error, "server_message", None)
+        return Secrets().text(brief(str(message), 160) if message else base_errors.first_line(error))
 
 
 # What stands beside the tables; the dataset card is what the Hub shows of a data set.

@@ -113,11 +113,11 @@ def plan_parts(root: DataRoot, options: ExportOptions, frames_a_part: int) -> li
     number = {text: k for k, text in enumerate(dict.fromkeys(texts))}
     parts: list[Part] = []
     for rows in _cuts(chosen, frames_a_part):
-        own, said = [known[chosen.nav_id[k]] for k in rows], [texts[k] for k in rows]
+        own, goals = [known[chosen.nav_id[k]] for k in rows], [texts[k] for k in rows]
         parts.append(Part(
             len(parts), chosen.take(rows), [row["setting"] for row in own],
             [f"{row['partition'].lower()}_{row['subset']}" for row in own],
-            np.array([number[text] for text in said], np.int64), said, int(rows[0]), int(chosen.first[rows[0]]),
+            np.array([number[text] for text in goals], np.int64), goals, int(rows[0]), int(chosen.first[rows[0]]),
         ))  # fmt: skip
     return parts
 

@@ -34,13 +34,6 @@ def sample_surface(scene: Scene, points_per_m2: float) -> NDArray[np.void]:
     return np.concatenate([np.empty(0, POINT), *parts])
 
 
-def ply_bytes(points: NDArray[np.void], comment: str) -> bytes:
-    """Encode points, a structured array, as binary little-endian PLY."""
-    fields = [f"property {_PLY[points.dtype[name].str]} {name}" for name in points.dtype.names or ()]
-    head = ["ply", "format binary_little_endian 1.0", f"comment {comment}", f"element vertex {len(points)}", *fields]
-    return "\n".join([*head, "end_header\n"]).encode() + points.tobytes()
-
-
 def _areas(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> NDArray[np.float64]:
     a, b, c = (vertices[faces[:, k]] for k in range(3))
     return np.asarray(np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2.0)
@@ -99,7 +92,9 @@ def write_points(scene: Scene, stem: Path, points_per_m2: float) -> dict[str, in
     """Write a scene's point cloud, and the nodes that its instances are."""
     points = sample_surface(scene, points_per_m2)
     about = f"{scene.name}: x east, y north, z up, metres; instance k is node k - 1 of the mesh"
-    stem.with_name(f"{stem.name}.ply").write_bytes(ply_bytes(points, about))
+    fields = [f"property {_PLY[POINT[name].str]} {name}" for name in POINT.names or ()]
+    head = ["ply", "format binary_little_endian 1.0", f"comment {about}", f"element vertex {len(points)}", *fields]
+    stem.with_name(f"{stem.name}.ply").write_bytes("\n".join([*head, "end_header\n"]).encode() + points.tobytes())
     write_json(stem.with_name(f"{stem.name}.nodes.json"), {"nodes": [one.node for one in scene.instances]})
     return {"points": len(points)}
 

@@ -54,7 +54,7 @@ class Teacher:
         # Who has strayed may be nearer than any task begins, or straight before the goal.
         self._planner = Planner(scene, PlanConfig().model_copy(update={"min_detour_ratio": 0.0}), radius_m)
 
-    def ways(self, goals: Sequence[ArrayLike], poses: Sequence[ArrayLike]) -> list[NDArray[np.int8]]:
+    def plan(self, goals: Sequence[ArrayLike], poses: Sequence[ArrayLike]) -> list[NDArray[np.int8]]:
         """Plan to goals from poses (metres, radians, world): the actions of each route, Stop at its end, or none."""
         out = [np.zeros(0, np.int8)] * len(poses)
         keys = [np.asarray(goal, np.float64).tobytes() for goal in goals]
@@ -89,7 +89,7 @@ class FlownEpisode:
         self.episode = Episode(space, (x, y, z, yaw), (goal[0], goal[1], goal[2]), budget)
         self.reckoning = DeadReckoning()
         # What the teacher would do from here on; empty where that is not known.
-        self.way = np.zeros(0, np.int8)
+        self.route = np.zeros(0, np.int8)
         # By name of an array of `Steps`.
         self.steps: list[dict[str, Any]] = []
 
@@ -101,7 +101,7 @@ class FlownEpisode:
     def note(self, frame: NDArray[np.uint8]) -> None:
         """Write down a step before it is flown."""
         self.steps.append({
-            "label": int(self.way[0]), "odometry": self.reckoning.odometry, "pose": self.pose,
+            "label": int(self.route[0]), "odometry": self.reckoning.odometry, "pose": self.pose,
             "blocked": blocked_at(self.space, self.pose)[0], "frames": frame,
         })  # fmt: skip
 
@@ -116,7 +116,7 @@ class FlownEpisode:
             chosen = label
         self.episode.step(chosen)
         # Who does what a route says is still on it; a new search from there would find its rest, or one as good.
-        self.way = self.way[1:] if chosen == self.way[0] and not self.episode.refused else self.way[:0]
+        self.route = self.route[1:] if chosen == self.route[0] and not self.episode.refused else self.route[:0]
         self.reckoning.add(chosen, self.episode.refused)
         return self.episode.termination is None and len(self.steps) < self._most
 
@@ -172,10 +172,11 @@ def _fly(
     going = list(range(len(flown)))
     memory = network.blank(len(flown))
     while going:
-        lost = [flown[k] for k in going if not len(flown[k].way)]
-        for one, way in zip(lost, teacher.ways([f.goal for f in lost], [f.pose for f in lost]), strict=True):
-            one.way = way
-        going = [k for k in going if len(flown[k].way)]
+        unplanned = [flown[k] for k in going if not len(flown[k].route)]
+        routes = teacher.plan([f.goal for f in unplanned], [f.pose for f in unplanned])
+        for one, route in zip(unplanned, routes, strict=True):
+            one.route = route
+        going = [k for k in going if len(flown[k].route)]
         if not going:
             return
         own = [flown[k] for k in going]

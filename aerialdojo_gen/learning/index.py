@@ -112,14 +112,40 @@ class Index:
 
 
 def read_index(
-    root: DataRoot, selection: Selection, target_split: str | None = None, runs: Sequence[str] = (),
-    paraphrase: str = "task",
+    roots: DataRoot | Sequence[DataRoot], selection: Selection, target_split: str | None = None,
+    runs: Sequence[str] = (), paraphrase: str = "task",
 ) -> Index:  # fmt: skip
-    """Read the references of a selection, or the successful flights of runs; paraphrases are drawn by its seed."""
+    """Read the references of a selection, or the successful flights of runs; paraphrases are drawn by its seed.
+
+    Several data directories have different scenes; of each come the tasks that fit, if any.
+    """
     if target_split is not None:
         check_known("no side of the split by objects", [target_split], _SIDES)
+    check_paraphrase(paraphrase)
+    parts: list[Index] = []
+    refused: list[UsageError] = []
+    known: dict[str, DataRoot] = {}
+    for root in [roots] if isinstance(roots, DataRoot) else roots:
+        try:
+            parts.append(_of_root(root, selection, target_split, runs, paraphrase))
+        except UsageError as error:
+            refused.append(error)
+            continue
+        for scene in parts[-1].scenes:
+            if scene in known:
+                raise UsageError(f"scene {scene} is in {known[scene]} and in {root}: name one of them")
+            known[scene] = root
+    if not parts:
+        raise refused[0] if refused else UsageError("name at least one data directory")
+    whole = _joined(parts)
+    return whole.take(np.argsort(whole.scene, kind="stable"))
+
+
+def _of_root(
+    root: DataRoot, selection: Selection, target_split: str | None, runs: Sequence[str], paraphrase: str
+) -> Index:
     chosen = select(root, selection)
-    if check_paraphrase(paraphrase) == "random":
+    if paraphrase == "random":
         chosen = _paraphrased(root, chosen, selection.seed)
     flown = _flown(root, runs)
     if runs:
@@ -133,30 +159,6 @@ def read_index(
     if not len(index):
         raise UsageError(f"no task of the selection has the target split {target_split!r}")
     return index
-
-
-def read_indices(
-    roots: Sequence[DataRoot], selection: Selection, target_split: str | None = None, runs: Sequence[str] = (),
-    paraphrase: str = "task",
-) -> Index:  # fmt: skip
-    """Read the trajectories of several data directories with different scenes, of each the tasks that fit, if any."""
-    parts: list[Index] = []
-    refused: list[UsageError] = []
-    for root in roots:
-        try:
-            parts.append(read_index(root, selection, target_split, runs, paraphrase))
-        except UsageError as error:
-            refused.append(error)
-    if not parts:
-        raise refused[0] if refused else UsageError("name at least one data directory")
-    known: dict[str, DataRoot] = {}
-    for part in parts:
-        for scene, root in part.roots.items():
-            if scene in known:
-                raise UsageError(f"scene {scene} is in {known[scene]} and in {root}: name one of them")
-            known[scene] = root
-    whole = _joined(parts)
-    return whole.take(np.argsort(whole.scene, kind="stable"))
 
 
 def _paraphrased(root: DataRoot, rows: pa.Table, seed: int) -> pa.Table:

@@ -166,8 +166,8 @@ def pose_loss(place: Any, heading: Any, scene: Any, pose: Any, number: Any) -> A
     """Cross-entropy loss of place (m, 164), heading (m, 24) and scene (m, scenes) logits against poses (m, 4)."""
     sector = (torch.remainder(pose[:, 3] + math.pi, 2.0 * math.pi) / _SECTOR_RAD - 0.5)[:, None]
     sectors = torch.arange(_HEADINGS, device=pose.device)
-    apart = torch.remainder(sectors - sector + _HEADINGS / 2, _HEADINGS) - _HEADINGS / 2
-    turned = functional.cross_entropy(heading, (1.0 - apart.abs()).clamp(min=0.0))
+    distance = torch.remainder(sectors - sector + _HEADINGS / 2, _HEADINGS) - _HEADINGS / 2
+    turned = functional.cross_entropy(heading, (1.0 - distance.abs()).clamp(min=0.0))
     return turned + _interval_loss(place, pose[:, :3]) + functional.cross_entropy(scene, number)
 
 
@@ -329,10 +329,10 @@ class Network(nn.Module):  # type: ignore[misc]  # no type checker sees torch he
 
     def encode_goal(self, tokens: Any, images: Any, goal_by_image: Any) -> Any:
         """Encode goals from tokens (n, length) and pictures (n, H, W, 4) uint8; (n, features)."""
-        said = functional.relu(self.phrase(self.words(tokens).transpose(1, 2)))
-        said = said.masked_fill((tokens == 0)[:, None], 0.0).amax(dim=2)
+        words = functional.relu(self.phrase(self.words(tokens).transpose(1, 2)))
+        words = words.masked_fill((tokens == 0)[:, None], 0.0).amax(dim=2)
         shown = self.encode_pictures(images) * goal_by_image[:, None]
-        return self.goal(torch.cat([said, shown, goal_by_image[:, None].float()], dim=1))
+        return self.goal(torch.cat([words, shown, goal_by_image[:, None].float()], dim=1))
 
     def forward(
         self, pictures: Any, goal: Any, odometry: Any, mask: Any, memory: Any = None

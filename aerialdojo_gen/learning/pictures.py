@@ -237,12 +237,12 @@ class RecordedFrames:
         index, s = self._index, self._sensors
         out = empty_frames(s, len(steps))
         # Of depth the nearest value, not a mean: between two surfaces there is none.
-        ways = {"rgb": cv2.INTER_AREA, "depth_m": cv2.INTER_NEAREST_EXACT}
+        interpolations = {"rgb": cv2.INTER_AREA, "depth_m": cv2.INTER_NEAREST_EXACT}
         for row, (k, step) in enumerate(zip(trajectories.tolist(), steps.tolist(), strict=True)):
             root, scene = index.sources[k]
             recording = _recording(root, f"media/{scene}/{index.nav_id[k]}")
             for (v, view), name in itertools.product(enumerate(s.views), out):
-                out[name][row, v] = _smaller(getattr(recording, name)[view][step], s, ways[name])
+                out[name][row, v] = _smaller(getattr(recording, name)[view][step], s, interpolations[name])
         if s.depth:
             clip_depth(out["depth_m"], s)
         return out

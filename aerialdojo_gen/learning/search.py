@@ -82,9 +82,9 @@ class Search:
         if not rows.any():
             return
         away_m, distance_m = away_m[rows], distance_m[rows]
-        said = self._target_words[self._target_words > 0.0]
+        named = self._target_words[self._target_words > 0.0]
         # How much less likely these words are than if they were all that is seen there.
-        score = log_chances[rows, :-1] @ self._target_words - float(said @ np.log(said))
+        score = log_chances[rows, :-1] @ self._target_words - float(named @ np.log(named))
         before = away_m * (1.0 - _BEFORE_M / np.maximum(distance_m, _BEFORE_M))[:, None]
         weight = 1.0 / (1.0 + distance_m / _CLEAR_M) ** 2
         cells = np.floor(_from_start(away_m, odometry) / _THING_M).astype(int)

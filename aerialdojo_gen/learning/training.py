@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import importlib
 import json
@@ -197,7 +198,9 @@ class _Training:
                 f"train {recipe.name}: begins with {self._init.path}, scenes known: {scenes:,}, new: "
                 f"{len(about.scenes) - scenes:,}; words known: {words:,}, new: {len(about.vocabulary) - words:,}"
             )
-        self._tensorboard = _tensorboard(self._folder / "tensorboard")
+        with contextlib.suppress(ImportError):
+            boards = importlib.import_module("torch.utils.tensorboard")
+            self._tensorboard = boards.SummaryWriter(str(self._folder / "tensorboard"))
         parts = self._collect(parts_of(self._common, index, recipe.seed), "drawing references")
         d = recipe.data
         if d.looks and d.views:
@@ -345,11 +348,3 @@ def _describe(kept: dict[str, Any]) -> str:
     suffix = f"; {' and '.join(known)} actions told" if known else ""
     off = f"{kept['goal_off_at_start_m']:.1f} m at the start, {kept['goal_off_m']:.1f} m in all"
     return f"{kept['accuracy']:.1%}; goal off by {off}{suffix}"
-
-
-def _tensorboard(folder: Path) -> Any:
-    """TensorBoard's writer; None if it is not installed."""
-    try:
-        return importlib.import_module("torch.utils.tensorboard").SummaryWriter(str(folder))
-    except ImportError:
-        return None

@@ -20,7 +20,7 @@ from aerialdojo_gen.benchmark.agents.goal import Sensors
 from aerialdojo_gen.benchmark.tasks import Selection, draw_evenly, mesh_of, reference_image
 from aerialdojo_gen.benchmark.worlds import make_worlds
 from aerialdojo_gen.learning import pictures
-from aerialdojo_gen.learning.index import Index, read_indices
+from aerialdojo_gen.learning.index import Index, read_index
 from aerialdojo_gen.learning.labels import PRIVILEGED, labels_at, scatter_rows, split_batch
 from aerialdojo_gen.learning.loader import Order
 from aerialdojo_gen.learning.words import Vocabulary
@@ -151,7 +151,7 @@ class Trajectories:
         modalities = ("image",) if self.goal == ("image",) else ()
         chosen = Selection(as_names(split), as_names(own.setting), modalities, as_names(own.scene), None, own.seed)
         roots = _roots(release, worlds, of_worlds)
-        self.index = read_indices(roots, chosen, own.target_split, as_names(own.run), own.paraphrase)
+        self.index = read_index(roots, chosen, own.target_split, as_names(own.run), own.paraphrase)
         if own.limit is not None:
             self.index = self.index.take(sample_evenly(self.index, own.limit, own.seed))
         self._source = None if self.sensors.blind else self._open_source(own)

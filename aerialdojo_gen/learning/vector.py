@@ -87,8 +87,8 @@ class ProgressReward(gymnasium.Wrapper[dict[str, Any], np.int64, dict[str, Any],
 
     def _goal_distance_m(self) -> float:
         env = self._own
-        ways = geodesic(*mesh_of(env.data, env.task.row["scene"]), env.radius_m)
-        return float(ways.distances_m(env.task.goal, [env.episode.position])[0])
+        geodesics = geodesic(*mesh_of(env.data, env.task.row["scene"]), env.radius_m)
+        return float(geodesics.distances_m(env.task.goal, [env.episode.position])[0])
 
 
 class OwnScenes(gymnasium.Wrapper[dict[str, Any], np.int64, dict[str, Any], np.int64]):

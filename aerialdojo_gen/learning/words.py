@@ -17,8 +17,8 @@ _WORD = re.compile(r"\w+|[^\w\s]")
 
 def goal_text(target_name: str, landmark: str, direction: str, description: str | None) -> str:
     """Say a goal in words, as the task gives it: name, direction from the landmark, and any description."""
-    said = f"{target_name}, {direction} of {landmark}"
-    return f"{said}. {description}" if description else said
+    text = f"{target_name}, {direction} of {landmark}"
+    return f"{text}. {description}" if description else text
 
 
 def words_of(text: str) -> list[str]:

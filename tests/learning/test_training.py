@@ -267,7 +267,7 @@ def test_the_teachers_labels_are_the_planners_own_plan():
     planner, teacher = Planner(world), Teacher(world)
     goal, *starts = free_poses(planner.grid, np.random.default_rng(1), 5)
     with teacher.cache_fields():
-        ways = teacher.ways([goal] * len(starts), starts)
+        ways = teacher.plan([goal] * len(starts), starts)
         for start, way in zip(starts, ways, strict=True):
             route = planner.plan_one(goal, start)
             assert route.outcome == "SOLVED"
@@ -275,7 +275,7 @@ def test_the_teachers_labels_are_the_planners_own_plan():
             episode = Episode(FlightSpace(world, 0.25), tuple(start), tuple(goal[:3]), 300)
             while episode.termination is None:
                 pose = np.array([*episode.position, episode.yaw_rad])
-                (way,) = teacher.ways([goal], [pose])
+                (way,) = teacher.plan([goal], [pose])
                 assert len(way)
                 episode.step(int(way[0]))
             assert episode.termination == "stop"
