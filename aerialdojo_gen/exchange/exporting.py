@@ -59,7 +59,6 @@ class Size:
     on_disk: int  # The same in whole blocks
 
     def __str__(self) -> str:
-        """In words."""
         megabytes = self.bytes / 1e6
         return f"{self.files:,} files, about {megabytes:,.{0 if megabytes >= 10 else 1}f} MB"
 

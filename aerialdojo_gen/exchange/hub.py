@@ -10,7 +10,7 @@ import itertools
 import os
 import re
 import shutil
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -26,7 +26,7 @@ from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.atomic import atomic_folder, make_folder
 from aerialdojo_gen.store.layout import is_plain
-from aerialdojo_gen.store.root import LocalRoot, Where, open_root
+from aerialdojo_gen.store.root import DataRoot, LocalRoot, Where, open_root
 
 TOKEN, ENDPOINT, USUAL = "HF_TOKEN", "HF_ENDPOINT", "https://huggingface.co"
 _REPO = re.compile(r"[A-Za-z0-9][\w.-]{0,95}/[A-Za-z0-9][\w.-]{0,95}")
@@ -287,15 +287,7 @@ def pull_release(
             path.unlink()
     _fetch(hub, commit, chosen, partial, reporter)
     size = sum((partial / place).stat().st_size for place in chosen)
-    fetched = open_root(partial)
-    # Reading every part verifies its columns; a mesh is held against what the release says of it.
-    for scene in check_release(fetched):
-        for key in SHARDS:
-            store.read_scene(fetched, key, scene)
-        row = store.read_scene(fetched, "release/scenes", scene, ("mesh_path", "mesh_sha256")).to_pylist()[0]
-        name = row["mesh_path"]
-        if name in chosen and fetched.digest(name) != row["mesh_sha256"]:
-            raise StoreError(f"{fetched.at(name)} is not the mesh that the release was made from: pull --no-meshes")
+    _verify(open_root(partial), chosen)
     _move_into_place(root, partial, sorted(chosen))
     return Moved(str(root.path / FOLDER), commit, len(scenes), len(chosen), size, sum(map(_is_mesh, chosen)), left)
 
@@ -376,6 +368,17 @@ def _matches_server(path: Path, sibling: Any) -> bool:
     with path.open("rb") as file:
         hashlib.file_digest(file, lambda: digest)
     return expected is not None and digest.hexdigest() == expected
+
+
+def _verify(root: DataRoot, fetched: Collection[str]) -> None:
+    """Read every part, which verifies its columns, and hold meshes against what the release says of them."""
+    for scene in check_release(root):
+        for key in SHARDS:
+            store.read_scene(root, key, scene)
+        row = store.read_scene(root, "release/scenes", scene, ("mesh_path", "mesh_sha256")).to_pylist()[0]
+        name = row["mesh_path"]
+        if name in fetched and root.digest(name) != row["mesh_sha256"]:
+            raise StoreError(f"{root.at(name)} is not the mesh that the release was made from: pull --no-meshes")
 
 
 def _move_into_place(root: LocalRoot, partial: Path, places: Sequence[str]) -> None:

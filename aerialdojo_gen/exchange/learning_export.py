@@ -59,7 +59,6 @@ class Estimate:
     measured: int  # Frames that were drawn and encoded to find out
 
     def __str__(self) -> str:
-        """Two lines for people."""
         size = f"{self.size_bytes / 1e9:.1f} GB" if self.size_bytes >= 1e9 else f"{self.size_bytes / 1e6:.0f} MB"
         each = 1e3 * self.cpu_s / self.frames
         return (

@@ -58,7 +58,8 @@ def write_part(root: DataRoot, part: Part, options: ExportOptions, folder: Path)
                         _add(tar, f"{key}.{view}.{kind}", _picture(rgb, options))
                     if "depth_m" in images:
                         file = io.BytesIO()
-                        np.savez_compressed(file, **{view: to_stored(of) for view, of in images["depth_m"].items()})
+                        stored = {view: to_stored(depth_m) for view, depth_m in images["depth_m"].items()}
+                        np.savez_compressed(file, **stored)  # type: ignore[arg-type]
                         _add(tar, f"{key}.depth.npz", file.getvalue())
                     if goal is not None:
                         _add(tar, f"{key}.goal.{kind}", goal)

@@ -45,7 +45,6 @@ class Index:
     goal_columns: dict[str, list[Any]]  # What each goal says, by column of `tasks`
 
     def __len__(self) -> int:
-        """Return the number of trajectories."""
         return len(self.nav_id)
 
     @cached_property

@@ -72,7 +72,6 @@ class Part:
         return f"{what} of {self.scene}"
 
     def __len__(self) -> int:
-        """Return the number of trajectories, or of views."""
         return len(self.nav_ids) if self.exploration is None else self.exploration.looks
 
     @property
@@ -130,7 +129,10 @@ def pictures(
 def goals_of(part: Part, index: Index) -> dict[str, Any]:
     """Read each trajectory's goal as text and image: fields of `Steps`."""
     names = [index.goal_columns[name] for name in ("target_name", "landmark", "direction", "description")]
-    text = [[goal_text(*words, None), goal_text(*words, said)] for *words, said in zip(*names, strict=True)]
+    text = [
+        [goal_text(name, landmark, direction, more) for more in (None, description)]
+        for name, landmark, direction, description in zip(*names, strict=True)
+    ]
     ids = index.goal_columns["reference_image_id"]
     known = sorted({*ids} - {None})
     shown = [goal_picture(reference_image(part.data, part.scene, one), part.sensors.width) for one in known]

@@ -201,7 +201,7 @@ class RenderedFrames:
         poses = {int(k): index.poses_of(int(k)) for k in np.unique(trajectories)}
         at = np.stack([poses[k][s] for k, s in zip(trajectories.tolist(), steps.tolist(), strict=True)])
         rgb, depth_m = draw_bodies(renderer_for(context.scene, self._renderer), sensors.camera, at, sensors.views)
-        images = {"rgb": rgb, "depth_m": clip_depth(depth_m, sensors)}
+        images: Frames = {"rgb": rgb, "depth_m": clip_depth(depth_m, sensors)}
         return {name: images[name] for name in empty_frames(sensors, 0)}
 
 

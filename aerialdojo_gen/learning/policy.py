@@ -216,7 +216,8 @@ class Policy(AgentBase):
             self._reckoning.add(self._previous, bool(observation.refused))
         pictures = None
         if sensors.views:
-            rgb, depth_m = (np.stack([of[v] for v in sensors.views]) for of in (observation.rgb, observation.depth_m))
+            rgb = np.stack([observation.rgb[view] for view in sensors.views])
+            depth_m = np.stack([observation.depth_m[view] for view in sensors.views])
             pictures = torch.from_numpy(packed(rgb, depth_m, sensors)[None]).to(device)
         odometry = torch.from_numpy(self._reckoning.odometry[None, None]).to(device)
         with torch.inference_mode():

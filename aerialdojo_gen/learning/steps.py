@@ -39,7 +39,6 @@ class Steps:
     names: NDArray[np.str_] = field(default_factory=lambda: np.zeros(0, "U1"))  # (k,) str; of those objects
 
     def __len__(self) -> int:
-        """Return the number of episodes."""
         return len(self.first) - 1
 
     def write(self, folder: Path) -> None:
@@ -93,7 +92,6 @@ class Pool:
         self._scene_of_step = np.repeat(self._scene, self.lengths)
 
     def __len__(self) -> int:
-        """Return the number of episodes."""
         return len(self.lengths)
 
     @property

@@ -206,11 +206,9 @@ class Flattened(gymnasium.ObservationWrapper[dict[str, Any], np.int64, dict[str,
         tokens = spaces.Box(0, len(self.vocabulary) - 1, (self.vocabulary.length,), np.int64)
         refused = spaces.Box(0, 1, (1,), np.int32)
         flat = {"tokens": tokens, "remaining_actions": seen["remaining_actions"], "refused": refused}
-        for name in self._JOINED.keys() & seen.spaces.keys():
+        for name in _JOIN.keys() & seen.spaces.keys():
             views: list[Any] = list(seen[name].spaces.values())  # type: ignore[attr-defined]
-            low, high = (
-                self._JOINED[name]([getattr(view, end) for view in views], axis=-1) for end in ("low", "high")
-            )
+            low, high = (_JOIN[name]([getattr(view, end) for view in views], axis=-1) for end in ("low", "high"))
             flat[name] = spaces.Box(low, high, dtype=views[0].dtype)
         self.observation_space = spaces.Dict(flat)
 

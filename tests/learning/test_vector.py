@@ -9,7 +9,7 @@ from gymnasium.utils.env_checker import check_env
 
 from aerialdojo_gen import make_env, open_release
 from aerialdojo_gen.base.errors import UsageError
-from aerialdojo_gen.learning.vector import OwnScenes, ProgressReward, make_vec
+from aerialdojo_gen.learning.vector import Flattened, OwnScenes, ProgressReward, make_vec
 
 
 class Blindfold(gymnasium.ObservationWrapper):
@@ -56,11 +56,12 @@ def test_a_collision_costs(smoke):
 
 
 def test_gymnasiums_checker_finds_nothing_in_the_wrappers(smoke):
-    env = ProgressReward(OwnScenes(make_env(smoke, views=("front",), width=16, height=16), ["U_Courtyard_0"]))
+    env = ProgressReward(OwnScenes(make_env(smoke, views=("front", "down"), width=16, height=16), ["U_Courtyard_0"]))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         warnings.filterwarnings("ignore", message=".*not.*unwrapped|.*spec.*|.*render_modes.*|.*is different from.*")
-        check_env(env, skip_render_check=True)
+        for one in (env, Flattened(env)):
+            check_env(one, skip_render_check=True)
 
 
 def test_stable_baselines_checker_takes_what_it_can_take(smoke):
@@ -68,8 +69,6 @@ def test_stable_baselines_checker_takes_what_it_can_take(smoke):
     checker = pytest.importorskip(
         "stable_baselines3.common.env_checker", reason="stable-baselines3 is not installed: tried where it is"
     )
-    from aerialdojo_gen.learning.vector import Flattened
-
     env = Flattened(ProgressReward(make_env(smoke, views=("front", "down"), width=48, height=48)))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
