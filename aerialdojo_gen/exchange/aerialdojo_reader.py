@@ -21,6 +21,7 @@ from aerialdojo_gen.pipeline.stages.work.build_scenes import parse_name
 
 _PAIR = re.compile(r"(\d{1,9})_(\d{1,9})__(\d{1,9})")
 _NUMBERS = ("start_object_id", "start_anchor_id", "target_object_id")
+_TEXTS = ("category", "description", "Landmark", "Direction")
 _STEP = ("position_ned_m", "quaternion_xyzw")
 _STATED = layout.INFO | {"geodesic_distance": "stated_length_m"}
 _START_FAR_M = 0.01
@@ -91,10 +92,10 @@ class Reader:
             "mesh_node": actor if target else None,
             "start_object_name": record.optional_text("start_true_name") or start_actor,
             "start_mesh_node": start_actor if record.has("start_true_name") else None,
-            "category": record.optional_text("category"),
-            "description": (description := record.optional_text("description")),
-            "landmark": record.optional_text("Landmark"),
-            "direction": record.optional_text("Direction"),
+            **{
+                name.lower(): record.optional_text(name)
+                for name in ("category", "description", "Landmark", "Direction")
+            },
             "family": family,
             "scene_type": scene_type,
             "partition": partition.partition if partition else by_name,
@@ -108,7 +109,7 @@ class Reader:
             known |= {ours: info.number(theirs) for theirs, ours in _STATED.items() if info.has(theirs)}
         image = record.optional_text("image")
         modality = kind or ("image" if image else "semantic")
-        instance = Instance("semantic", description)
+        instance = Instance("semantic", known["description"])
         if modality == "image":
             # What the picture shows is the object's to say, not the image task's: it would give the goal away.
             instance = Instance("image")

@@ -26,7 +26,7 @@ _DIRECTIONS = {"e": (1, 0, 0), "w": (-1, 0, 0), "n": (0, 1, 0), "s": (0, -1, 0),
 
 @dataclass(frozen=True)
 class Frame:
-    """A right-handed frame whose z axis is vertical."""
+    """A right-handed frame; what is said of yaws holds where its z axis is vertical."""
 
     name: str  # Where its x, y and z axes point, e.g. ``ned`` for north, east, down
 
@@ -68,17 +68,12 @@ FRAMES = {name: Frame(name) for name in ("enu", "nwu", "ned", "esd")}
 NED = FRAMES["ned"]
 
 
-def world_to_habitat(xyz_m: ArrayLike) -> Floats:
-    """Turn world positions, (..., 3) metres, into Habitat's frame: x east, y up, z south."""
-    p = np.asarray(xyz_m, np.float64)
-    return np.stack([p[..., 0], p[..., 2], -p[..., 1]], axis=-1) + 0.0
+HABITAT = Frame("eus")  # Its y axis is the vertical one
 
 
 def yaw_to_habitat_quaternion_xyzw(yaw_rad: ArrayLike) -> Floats:
     """Attitudes, (..., 4) unit xyzw, of upright bodies in Habitat, where a body at rest looks along -z (north)."""
-    half = wrap_angle_rad(np.asarray(yaw_rad, np.float64) - np.pi / 2) / 2
-    zero = np.zeros_like(half)
-    return np.stack([zero, np.sin(half), zero, np.cos(half)], axis=-1)
+    return yaw_to_quaternion_xyzw(np.asarray(yaw_rad, np.float64) - np.pi / 2)[..., [0, 2, 1, 3]]
 
 
 # What our actions do, (17, 4) float64: steps.

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
-from aerialdojo_gen.exchange.frames import world_to_habitat, yaw_to_habitat_quaternion_xyzw
+from aerialdojo_gen.exchange.frames import HABITAT, yaw_to_habitat_quaternion_xyzw
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import DataRoot
 from aerialdojo_gen.store.schemas import DIFFICULTY_COLUMNS, SPLIT_COLUMNS, SUBSETS
@@ -109,13 +109,13 @@ def _goal(row: Mapping[str, Any], anchors: Sequence[Mapping[str, Any]]) -> dict[
 
 
 def _position(row: Mapping[str, Any], prefix: str = "") -> list[float]:
-    return world_to_habitat([row[f"{prefix}{a}_m"] for a in "xyz"]).tolist()
+    return HABITAT.positions_from_world([row[f"{prefix}{a}_m"] for a in "xyz"]).tolist()
 
 
 def _episodes(routes: pa.Table, mesh: str, category_of: Mapping[int, str]) -> Iterator[dict[str, Any]]:
     for batch in routes.to_batches(max_chunksize=1024):
         for row in batch.to_pylist():
-            positions = world_to_habitat(np.column_stack([row["x_m"], row["y_m"], row["z_m"]])).tolist()
+            positions = HABITAT.positions_from_world(np.column_stack([row["x_m"], row["y_m"], row["z_m"]])).tolist()
             rotations = yaw_to_habitat_quaternion_xyzw(row["yaw_rad"]).tolist()
             points = zip(positions, rotations, row["action"], strict=True)
             yield {

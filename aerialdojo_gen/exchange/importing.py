@@ -12,14 +12,14 @@ from typing import Any, TextIO
 
 import numpy as np
 
-from aerialdojo_gen.base.errors import ImportRefused, StoreError, UsageError, brief
+from aerialdojo_gen.base.errors import ImportRefused, UsageError, brief
 from aerialdojo_gen.base.names import check_known
 from aerialdojo_gen.exchange import aerialdojo_reader, readers
 from aerialdojo_gen.exchange.folder import whole_folder_below, write_json
 from aerialdojo_gen.exchange.frames import FRAMES, Frame
-from aerialdojo_gen.exchange.records import RECORD_LIMIT, BadField, Fields, records
+from aerialdojo_gen.exchange.records import BadField, Fields, records, shown
 from aerialdojo_gen.exchange.task import Context, Tables, Task, digest, route_row, task_rows
-from aerialdojo_gen.store.layout import check_scene_name, is_plain
+from aerialdojo_gen.store.layout import is_plain
 from aerialdojo_gen.store.root import Where, open_root
 
 _MAX_NAMED = 1000
@@ -187,7 +187,6 @@ class Options:
     pictures: Path | None = None  # Folder below which CityAVOS's pictures lie; None: the file's own
     with_pictures: bool = True  # False: leave pictures aside, and the image instances of CityAVOS with them
     skip_bad: bool = False  # Keep the good records of files that have bad ones
-    record_limit: int = RECORD_LIMIT  # Most characters of a record
 
 
 def import_benchmark(
@@ -272,17 +271,16 @@ def _tasks(
         report.files.append(label)
         pictures = (options.pictures or path.parent) if options.with_pictures else None
         ids: set[str] = set()
-        for row, value in enumerate(records(path, chosen.key, limit=options.record_limit)):
+        for row, value in enumerate(records(path, chosen.key)):
             report.records += 1
             # Notes count only if the record turns out good.
             context = Context(path, label, frame, options.angles, pictures, Counter())
             try:
                 record = Fields(value)
                 task = read(record, context)
-                try:
-                    check_scene_name(task.scene)
-                except StoreError as error:
-                    raise BadField("scene", str(error)) from None
+                if not is_plain(task.scene):
+                    why = "is not a scene name: use letters, digits, _ and - (64 at most)"
+                    raise BadField("scene", f"{shown(task.scene)} {why}")
                 if task.source_id in ids:
                     raise BadField("id", f"{brief(task.source_id, 60)} appears twice in the file")
             except BadField as error:

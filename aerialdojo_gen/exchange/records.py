@@ -211,6 +211,7 @@ def _numbers(values: Sequence[Any], path: str) -> list[float]:
     return [float(value) for value in values]
 
 
+# Most characters of a record.
 RECORD_LIMIT = 16 << 20
 _CHUNK = 1 << 20
 _SPACE = " \t\r\n"
@@ -220,8 +221,8 @@ _LONGEST_EXPONENT = 8
 class _Text:
     """What of a file is read and not yet used."""
 
-    def __init__(self, file: BinaryIO, path: Path, limit: int) -> None:
-        self.path, self.limit = path, limit
+    def __init__(self, file: BinaryIO, path: Path) -> None:
+        self.path = path
         self.place = "the beginning"
         self._file = file
         self._decoder = codecs.getincrementaldecoder("utf-8-sig")()
@@ -295,17 +296,17 @@ class _Text:
                     self._at = end
                     return value
                 why = ""
-            if len(self._text) - self._at > self.limit:
-                raise self.fail(f"larger than {self.limit >> 10:,} KiB, or damaged ({why or 'no end'})")
+            if len(self._text) - self._at > RECORD_LIMIT:
+                raise self.fail(f"larger than {RECORD_LIMIT >> 10:,} KiB, or damaged ({why or 'no end'})")
             if not self._more():
                 raise self.fail(f"damaged or truncated ({why})")
 
 
-def records(path: Path, key: str | None = None, *, limit: int = RECORD_LIMIT) -> Iterator[Any]:
+def records(path: Path, key: str | None = None) -> Iterator[Any]:
     """Read a JSON list a record at a time: the file's own, or the one at a key of its object."""
     try:
         with path.open("rb") as file:
-            text = _Text(file, path, limit)
+            text = _Text(file, path)
             yield from _list(text) if key is None else _under(text, key)
             if text.peek():
                 raise text.fail(f"{text.peek()!r} after the end of the value")
@@ -334,12 +335,12 @@ def _list(text: _Text) -> Iterator[Any]:
         yield text.value()
 
 
-def small_document(path: Path, *, limit: int = RECORD_LIMIT) -> Any:
-    """Read a whole JSON file of at most `limit` bytes."""
+def small_document(path: Path) -> Any:
+    """Read a whole JSON file of at most `RECORD_LIMIT` bytes."""
     check_regular(path)
     with path.open("rb") as file:
-        raw = file.read(limit + 1)
-    if len(raw) > limit:
-        raise ValueError(f"is larger than {limit >> 10:,} KiB")
+        raw = file.read(RECORD_LIMIT + 1)
+    if len(raw) > RECORD_LIMIT:
+        raise ValueError(f"is larger than {RECORD_LIMIT >> 10:,} KiB")
     # NaN is a value to be named in its row.
     return loads_json(raw, finite=False)

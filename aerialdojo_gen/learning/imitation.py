@@ -80,11 +80,11 @@ def blocked_loss(logits: Any, blocked: Any) -> Any:
 class Learner:
     """A network, the moments of its gradients, and what it learns by."""
 
-    def __init__(self, network: Network, recipe: Recipe, device: str) -> None:
+    def __init__(self, network: Network, recipe: Recipe, device: str, phase: int) -> None:
         self.torch = torch_package()
         self.network = network.to(device)
         self.recipe, self.device = recipe, device
-        self.begin(0)
+        self.begin(phase)
         # Steps of the pool that are not kept back.
         self._about: list[tuple[Pool, Any, NDArray[np.int64]]] = []
 

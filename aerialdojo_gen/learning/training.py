@@ -166,10 +166,9 @@ class _Training:
         network = Network(shape)
         if init is not None:
             init.copy_to(network)
-        self._learner = Learner(network, recipe, device)
         # The patch classifier is trained before the references.
         self._first = -1 if named else 0
-        self._learner.begin(self._first)
+        self._learner = Learner(network, recipe, device, self._first)
         self._reported = self._kept = time.monotonic()
         self._tensorboard: Any = None
         self._exploration: Pool | None = None

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from aerialdojo_gen.exchange import frames as foreign
-from aerialdojo_gen.exchange.frames import FRAMES, actions_of, move, words_of
+from aerialdojo_gen.exchange.frames import FRAMES, HABITAT, actions_of, move, words_of
 from aerialdojo_gen.exchange.readers import AERIALVLN_MOVES as AERIALVLN
 from aerialdojo_gen.exchange.readers import OPENFLY_MOVES as OPENFLY
 from aerialdojo_gen.geometry import motion
@@ -32,7 +32,7 @@ def forward(yaw):
 @given(frames, points)
 def test_positions_come_back_to_the_last_bit(frame, point):
     assert frame.positions_to_world(frame.positions_from_world(point)).tolist() == list(point)
-    x, y, z = foreign.world_to_habitat(point)
+    x, y, z = HABITAT.positions_from_world(point)
     assert [x, -z, y] == list(point)
 
 
@@ -49,11 +49,11 @@ def test_an_attitude_looks_the_same_way_in_both_frames(frame, yaw):
 @given(yaws)
 def test_habitats_bodies_look_along_minus_z(yaw):
     quaternion = foreign.yaw_to_habitat_quaternion_xyzw(yaw)
-    assert rotate(quaternion, [0, 0, -1]) == pytest.approx(foreign.world_to_habitat(forward(yaw)), abs=1e-12)
+    assert rotate(quaternion, [0, 0, -1]) == pytest.approx(HABITAT.positions_from_world(forward(yaw)), abs=1e-12)
     # Up stays up, left stays left.
-    assert rotate(quaternion, [0, 1, 0]) == pytest.approx(foreign.world_to_habitat([0, 0, 1]), abs=1e-12)
+    assert rotate(quaternion, [0, 1, 0]) == pytest.approx(HABITAT.positions_from_world([0, 0, 1]), abs=1e-12)
     assert rotate(quaternion, [-1, 0, 0]) == pytest.approx(
-        foreign.world_to_habitat(forward(yaw + math.pi / 2)), abs=1e-12
+        HABITAT.positions_from_world(forward(yaw + math.pi / 2)), abs=1e-12
     )
 
 

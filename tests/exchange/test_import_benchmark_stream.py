@@ -64,27 +64,21 @@ def test_damage_is_named_by_its_row(tmp_path, text, key, error):
     assert "\n" not in str(refused.value)
 
 
-def test_a_record_beyond_the_limit_is_refused_by_name(tmp_path):
+def test_a_record_or_document_beyond_the_limit_is_refused_by_name(tmp_path, monkeypatch):
     rows = task_files.uav_on(3)
     rows[1]["description"] = "x" * 5_000_000
-    path = task_files.write(tmp_path / "long.json", rows)
+    path, document = task_files.write(tmp_path / "long.json", rows), task_files.write(tmp_path / "t.json", rows[1])
+    import_benchmark("uav-on", [path], tmp_path, name="whole")
+    assert pd.read_parquet(tmp_path / "imported/whole/tasks")["description"].str.len().max() == 5_000_000
+    assert small_document(document) == rows[1]
+    monkeypatch.setattr(records_module, "RECORD_LIMIT", 1 << 20)
     with pytest.raises(ImportRefused, match=r"long\.json: row 1: larger than 1,024 KiB"):
-        import_benchmark("uav-on", [path], tmp_path, Options(record_limit=1 << 20, skip_bad=True))
+        import_benchmark("uav-on", [path], tmp_path, Options(skip_bad=True))
     assert not (tmp_path / "imported/uav-on").exists()
     # The record before it was read already: the limit is one of a record, not of the file.
-    taken = records(path, limit=1 << 20)
-    assert next(taken)["episode_id"] == "0"
-    with pytest.raises(ImportRefused, match="row 1: larger than"):
-        next(taken)
-    import_benchmark("uav-on", [path], tmp_path)
-    assert pd.read_parquet(tmp_path / "imported/uav-on/tasks")["description"].str.len().max() == 5_000_000
-
-
-def test_a_document_beyond_the_limit_is_refused(tmp_path):
-    path = task_files.write(tmp_path / "t.json", {"a": "x" * 2000})
-    with pytest.raises(ValueError, match="is larger than 1 KiB"):
-        small_document(path, limit=1024)
-    assert small_document(path, limit=4096) == {"a": "x" * 2000}
+    assert next(records(path))["episode_id"] == "0"
+    with pytest.raises(ValueError, match="is larger than 1,024 KiB"):
+        small_document(document)
 
 
 MEASURE = """
