@@ -92,10 +92,7 @@ class Reader:
             "mesh_node": actor if target else None,
             "start_object_name": record.optional_text("start_true_name") or start_actor,
             "start_mesh_node": start_actor if record.has("start_true_name") else None,
-            **{
-                name.lower(): record.optional_text(name)
-                for name in ("category", "description", "Landmark", "Direction")
-            },
+            **{name.lower(): record.optional_text(name) for name in _TEXTS},
             "family": family,
             "scene_type": scene_type,
             "partition": partition.partition if partition else by_name,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import re
 from collections.abc import Mapping, Sequence
@@ -25,6 +24,7 @@ from aerialdojo_gen.rendering.backend import choose_renderer, scene_renderer
 from aerialdojo_gen.scenes.context import open_scene
 from aerialdojo_gen.scenes.stored import mesh_copy
 from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.files import sha256_of
 from aerialdojo_gen.store.root import DataRoot
 from aerialdojo_gen.store.schemas import DIFFICULTY_COLUMNS, SPLIT_COLUMNS
 
@@ -54,7 +54,7 @@ class _Pictures:
         except FileNotFoundError:
             missing = f"{root.at(row['mesh_path'])} is missing"
             raise AssetError(f"{missing}, so its pictures cannot be drawn at {size_px} px: {_OWN_PICTURES}") from None
-        if hashlib.sha256(mesh.read_bytes()).hexdigest() != row["mesh_sha256"]:
+        if sha256_of(mesh) != row["mesh_sha256"]:
             raise AssetError(f"{mesh} is not the mesh that the release was made from: {_OWN_PICTURES}")
         self._scene = open_scene(mesh, row["mesh_sha256"]).scene
         self._renderer_name = choose_renderer("auto").name

@@ -25,6 +25,7 @@ from aerialdojo_gen.dataset.contents import FOLDER, SHARDS, check_release, exist
 from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.atomic import atomic_folder, make_folder
+from aerialdojo_gen.store.files import sha256_of
 from aerialdojo_gen.store.layout import is_plain
 from aerialdojo_gen.store.root import DataRoot, LocalRoot, Where, open_root
 
@@ -362,12 +363,11 @@ def _matches_server(path: Path, sibling: Any) -> bool:
     if sibling.size is not None and size != sibling.size:
         return False
     if sibling.lfs is not None:
-        expected, digest = sibling.lfs.sha256, hashlib.sha256()
-    else:
-        expected, digest = sibling.blob_id, hashlib.sha1(b"blob %d\0" % size, usedforsecurity=False)
+        return bool(sha256_of(path) == sibling.lfs.sha256)
+    digest = hashlib.sha1(b"blob %d\0" % size, usedforsecurity=False)
     with path.open("rb") as file:
         hashlib.file_digest(file, lambda: digest)
-    return expected is not None and digest.hexdigest() == expected
+    return bool(digest.hexdigest() == sibling.blob_id)
 
 
 def _verify(root: DataRoot, fetched: Collection[str]) -> None:

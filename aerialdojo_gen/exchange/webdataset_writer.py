@@ -8,12 +8,11 @@ import tarfile
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.base.errors import RenderError, StoreError, brief
-from aerialdojo_gen.base.pictures import FRAME_PNG, encode_png
+from aerialdojo_gen.base.errors import StoreError, brief
+from aerialdojo_gen.base.pictures import FRAME_PNG, encode_jpeg, encode_png
 from aerialdojo_gen.exchange.folder import link_or_copy, write_json
 from aerialdojo_gen.exchange.samples import ExportOptions, Part, SampleFrames
 from aerialdojo_gen.learning.labels import labels_at
@@ -83,12 +82,7 @@ def _to_json(part: Part, k: int, options: ExportOptions) -> list[dict[str, Any]]
 
 
 def _picture(rgb: NDArray[np.uint8], options: ExportOptions) -> bytes:
-    if not options.jpeg_quality:
-        return encode_png(rgb, FRAME_PNG)
-    done, data = cv2.imencode(".jpg", rgb[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, options.jpeg_quality])
-    if not done:
-        raise RenderError(f"OpenCV could not compress a picture of {rgb.shape[1]} x {rgb.shape[0]} pixels")
-    return bytes(data)
+    return encode_jpeg(rgb, options.jpeg_quality) if options.jpeg_quality else encode_png(rgb, FRAME_PNG)
 
 
 def _add(tar: tarfile.TarFile, name: str, content: bytes) -> None:

@@ -30,7 +30,7 @@ from aerialdojo_gen.learning.index import Index
 from aerialdojo_gen.learning.labels import blocked_at, scatter_rows, to_body_frame
 from aerialdojo_gen.learning.loader import torch_package
 from aerialdojo_gen.learning.parts import DaggerRound, Exploration, Part
-from aerialdojo_gen.learning.policy import network_of, read_weights
+from aerialdojo_gen.learning.policy import read_network
 from aerialdojo_gen.learning.steps import Steps, is_written, read_steps
 from aerialdojo_gen.learning.words import Vocabulary
 from aerialdojo_gen.pipeline.code_digest import code_of
@@ -133,8 +133,8 @@ def flights(part: Part, dagger_round: DaggerRound) -> Steps:
     index, space, radius_m = part.index(), part.space, Embodiment().radius_m
     context = open_scene(*mesh_of(part.data, part.scene), SEVERAL)
     teacher = context.part("teacher", lambda: Teacher(context.scene, radius_m), radius_m)
-    tensors, about, _ = read_weights(dagger_round.weights)
-    network = network_of(about, tensors, str(dagger_round.weights)).eval()
+    network, about = read_network(dagger_round.weights)
+    network.eval()
     goals, columns = part_data.goal_poses(part, index), part_data.goals_of(part, index)
     order = np.lexsort((np.arange(len(index)), *index.goal.T))
     flown: dict[int, FlownEpisode] = {}

@@ -133,8 +133,7 @@ class InitialWeights:
 
 def read_initial_weights(path: str | Path) -> InitialWeights:
     """Read weights of `train`; UsageError or StoreError where there are none to begin with."""
-    tensors, about, _ = read_weights(path)
-    network = network_of(about, tensors, str(path))
+    network, about = read_network(path)
     if not about.scenes:
         raise UsageError(
             f"{path} does not say which scenes it was trained on (an older version wrote it): train it again"
@@ -162,12 +161,12 @@ class Policy(AgentBase):
             raise UsageError("a policy needs weights: --option weights=data/policies/imitation/policy.safetensors")
         # An observation is too little work to be shared, and the cores have a worker each.
         torch.set_num_threads(1)
-        tensors, self._about, _ = read_weights(weights)
+        network, self._about = read_network(weights)
         self._sha256, self._weights = file_digest(Path(weights)), weights
         if sha256 is not None and sha256 != self._sha256:
             raise UsageError(f"{weights} has changed since the run began: give another --run")
         self._any_release, self._device = any_release, device
-        self.network = network_of(self._about, tensors, weights).to(device).eval()
+        self.network = network.to(device).eval()
         self.sensors = self._about.sensors
 
     def check(self) -> str:
@@ -262,10 +261,11 @@ def _check_shapes(about: PolicyInfo, shape: Any) -> None:
         raise ValueError(f"texts of {vocabulary.length} tokens, {_LONGEST} at most")
 
 
-def network_of(about: PolicyInfo, tensors: dict[str, Any], where: str) -> Any:
+def read_network(path: str | Path) -> tuple[Any, PolicyInfo]:
     """Make the network that weights are of; StoreError where they do not fit it."""
     from aerialdojo_gen.learning.network import Network, Shape
 
+    tensors, about, _ = read_weights(path)
     try:
         shape = Shape(**{**about.shape, "channels": tuple(about.shape["channels"])})
         # Of no memory until the file's own tensors are in it: a shape may say anything.
@@ -275,5 +275,5 @@ def network_of(about: PolicyInfo, tensors: dict[str, Any], where: str) -> Any:
         network.float()
         _check_shapes(about, shape)
     except (RuntimeError, TypeError, ValueError, KeyError) as error:
-        raise StoreError(f"{where} holds no policy of this version: {first_line(error)}") from None
-    return network
+        raise StoreError(f"{path} holds no policy of this version: {first_line(error)}") from None
+    return network, about

@@ -31,10 +31,9 @@ def train_here(data: Any, recipe: Recipe, out: Path, cache: Path, **options: Any
 
 def network(policy: Path) -> Any:
     """The network of a policy's weights."""
-    from aerialdojo_gen.learning.policy import network_of, read_weights
+    from aerialdojo_gen.learning.policy import read_network
 
-    tensors, about, _ = read_weights(policy)
-    return network_of(about, tensors, str(policy)).eval()
+    return read_network(policy)[0].eval()
 
 
 def rewritten(policy: Path, path: Path, lacking: str | None = None, **said: Any) -> Path:
