@@ -38,7 +38,7 @@ EXPECTED_SKIPS = (
 
 # Files with the longest tests, which begin.
 DEAREST = (
-    "tests/test_doc_blocks.py", "tests/layouts/test_every_scene.py", "tests/learning/test_several_places.py",
+    "tests/test_doc_blocks.py", "tests/layouts/test_every_scene.py", "tests/learning/test_trajectories.py",
     "tests/learning/test_training.py", "tests/pipeline/test_resume.py", "tests/test_wheel.py",
     "tests/pipeline/test_render_scale.py", "tests/scenes/test_worlds.py", "tests/scenes/test_shipped_catalogue.py",
     "tests/dataset/test_validate_every_row.py", "tests/benchmark/test_evaluate.py", "tests/learning/test_loader.py",

@@ -132,7 +132,7 @@ def export(
     pointcloud (PLY) and occupancy (NumPy's npz) are of all scenes whose meshes are there, and need no release.
     """
     from aerialdojo_gen.base.names import unknown
-    from aerialdojo_gen.exchange.exporting import FORMATS, export_release
+    from aerialdojo_gen.exchange import exporting
     from aerialdojo_gen.pipeline.progress import Reporter
 
     training = {
@@ -142,7 +142,7 @@ def export(
         "size": (width or height or 128, height or width or 128) if width or height else None,
     }  # fmt: skip
     given = {name: value for name, value in training.items() if value is not None and value != []}
-    if form not in (known := (*FORMATS, *FOR_TRAINING, *SHAPES)):
+    if form not in (known := (*exporting.FORMATS, *FOR_TRAINING, *SHAPES)):
         raise UsageError(unknown("no format", form, known))
     _check_fits(form, FOR_TRAINING, {
         **{_WRITTEN.get(name, f"--{name}"): value for name, value in given.items()},
@@ -160,15 +160,13 @@ def export(
         return
     reporter = Reporter(quiet=quiet or as_json)
     if form in SHAPES:
-        from aerialdojo_gen.exchange.shape_export import POINTS_PER_M2, VOXEL_M, export_shapes
-
-        counts = export_shapes(
+        counts = exporting.export_shapes(
             form, root, target, chosen, force=force, reporter=reporter,
-            points_per_m2=POINTS_PER_M2 if points_per_m2 is None else points_per_m2,
-            voxel_m=VOXEL_M if voxel_m is None else voxel_m,
+            points_per_m2=exporting.POINTS_PER_M2 if points_per_m2 is None else points_per_m2,
+            voxel_m=exporting.VOXEL_M if voxel_m is None else voxel_m,
         )  # fmt: skip
     else:
-        counts = export_release(
+        counts = exporting.export_release(
             form, root, target, chosen, force=force, picture_px=picture_size, shards=shards, reporter=reporter
         )
     _print_export(target, counts, {}, as_json, quiet)

@@ -56,10 +56,8 @@ def parse_partition(folder: Path) -> Partition | None:
         return None
     split, category, name = folder.parts[-3:]
     is_split, is_name = _SPLIT.fullmatch(split), _FOLDER.fullmatch(name)
-    settings = [setting for setting, words in SETTING_WORDS.items() if words[0] == category]
-    if not is_split or not is_name or not settings or SETTING_WORDS[settings[0]][1] != is_name[2]:
+    if not is_split or not is_name or is_name[3].upper() != is_split[2]:
         return None
-    subset = is_name[3].lower()
-    if subset != is_split[2].lower():
-        return None
-    return Partition(is_name[1], settings[0], "OOD" if is_split[1] == "OOD" else "ID", subset, split)
+    settings = [setting for setting, words in SETTING_WORDS.items() if words[:2] == (category, is_name[2])]
+    part = "OOD" if is_split[1] == "OOD" else "ID"
+    return Partition(is_name[1], settings[0], part, is_name[3].lower(), split) if settings else None

@@ -12,17 +12,17 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.base.errors import StoreError, UsageError
 from aerialdojo_gen.exchange import aerialdojo_layout as layout
-from aerialdojo_gen.exchange.actions import WORDS, actions_of
-from aerialdojo_gen.exchange.fields import BadField, Fields, plain, positions_of, quaternions_of, shown
+from aerialdojo_gen.exchange import records
 from aerialdojo_gen.exchange.folder import inside
-from aerialdojo_gen.exchange.jsonstream import small_document
+from aerialdojo_gen.exchange.frames import WORDS, actions_of
+from aerialdojo_gen.exchange.records import BadField, Fields, shown
 from aerialdojo_gen.exchange.task import Context, Instance, Route, Task, digest, picture_at
 from aerialdojo_gen.pipeline.stages.work.build_scenes import parse_name
 
 _PAIR = re.compile(r"(\d{1,9})_(\d{1,9})__(\d{1,9})")
 _NUMBERS = ("start_object_id", "start_anchor_id", "target_object_id")
+_TEXTS = ("category", "description", "Landmark", "Direction")
 _STEP = ("position_ned_m", "quaternion_xyzw")
-_KNOWN = {"action", *_STEP}
 _STATED = layout.INFO | {"geodesic_distance": "stated_length_m"}
 _START_FAR_M = 0.01
 _EXACT = 1e-6
@@ -55,8 +55,8 @@ class Reader:
 
     def __init__(self) -> None:
         self._partition: tuple[str, ...] = ()
-        self._known: dict[str, Task] = {}
-        self._met: set[tuple[str, str]] = set()
+        self._tasks: dict[str, Task] = {}
+        self._read_ids: set[tuple[str, str]] = set()
         self._nav_ids: set[str] = set()
 
     def read(self, record: Fields, context: Context) -> Task:
@@ -67,7 +67,7 @@ class Reader:
         episode = record.name("episode_id")
         if not re.fullmatch(r"[A-Za-z0-9_-]{1,100}", episode):
             raise BadField("episode_id", f"{shown(episode)} cannot name a file")
-        if (context.label, episode) in self._met:
+        if (context.label, episode) in self._read_ids:
             raise BadField("episode_id", f"{episode} appears twice in the file")
         scene = record.text("map_name", empty=False)
         try:
@@ -80,9 +80,8 @@ class Reader:
         trains = record.flag("used-in-train")
         if partition is not None:
             _agree(partition, scene, word, trains)
-        pose = record.child("start_pose")
+        pose, goal = record.child("start_pose"), None
         start = context.upright_pose(pose.position("start_position"), _attitude(pose))
-        goal = None
         if record.has("goal_pose"):
             goal = context.frame.positions_to_world(record.child("goal_pose").position("goal_position"))
         # Where readable names stand beside them, the others are the actors'.
@@ -93,10 +92,7 @@ class Reader:
             "mesh_node": actor if target else None,
             "start_object_name": record.optional_text("start_true_name") or start_actor,
             "start_mesh_node": start_actor if record.has("start_true_name") else None,
-            "category": record.optional_text("category"),
-            "description": (description := record.optional_text("description")),
-            "landmark": record.optional_text("Landmark"),
-            "direction": record.optional_text("Direction"),
+            **{name.lower(): record.optional_text(name) for name in _TEXTS},
             "family": family,
             "scene_type": scene_type,
             "partition": partition.partition if partition else by_name,
@@ -110,22 +106,18 @@ class Reader:
             known |= {ours: info.number(theirs) for theirs, ours in _STATED.items() if info.has(theirs)}
         image = record.optional_text("image")
         modality = kind or ("image" if image else "semantic")
+        instance = Instance("semantic", known["description"])
         if modality == "image":
             # What the picture shows is the object's to say, not the image task's: it would give the goal away.
-            instance = Instance("image", None, self._picture(image, context))
-        else:
-            instance = Instance("semantic", description)
+            instance = Instance("image")
+            if context.pictures is not None:
+                if image is None:
+                    raise BadField("image", "is missing")
+                instance = Instance("image", picture=picture_at(context.file.parent, image, "image"))
         task = Task(episode, scene, start=start, goal=goal, instances=[instance], object_key=actor, known=known)
         self._join(task, context, folder, partition, record.optional_text("trajectory_id"))
-        self._met.add((context.label, episode))
+        self._read_ids.add((context.label, episode))
         return task
-
-    def _picture(self, image: str | None, context: Context) -> Path | None:
-        if context.pictures is None:
-            return None
-        if image is None:
-            raise BadField("image", "is missing")
-        return picture_at(context.file.parent, image, "image")
 
     def _join(
         self, task: Task, context: Context, folder: Path, partition: layout.Partition | None, own: str | None
@@ -133,9 +125,9 @@ class Reader:
         """Give the task its trajectory, or what its other instance brought already; `own` is its trajectory's id."""
         place = folder.parts[-3:] if partition else (context.label,)
         if place != self._partition:
-            self._partition, self._known = place, {}
-            self._met = {pair for pair in self._met if pair[0] == context.label}
-        if (other := self._known.get(task.source_id)) is not None:
+            self._partition, self._tasks = place, {}
+            self._read_ids = {pair for pair in self._read_ids if pair[0] == context.label}
+        if (other := self._tasks.get(task.source_id)) is not None:
             if float(np.linalg.norm(task.start[:3] - other.start[:3])) > _START_FAR_M:
                 raise BadField("start_pose.start_position", "is not that of the episode's other instance")
             if task.object_key != other.object_key:
@@ -152,16 +144,16 @@ class Reader:
             else:
                 context.notes[f"no folder in {layout.TRAJECTORIES} for its partition: no route"] += 1
         # Ours bring their name; of others the objects make it, so that any part of a dataset gives the same names.
-        name = f"{task.scene}-{digest(task.scene, pair)}" if pair else None
+        name = f"{task.scene}-{digest(task.scene, pair)}" if pair else ""
         if own and re.fullmatch(rf"{re.escape(task.scene)}-[A-Za-z0-9]{{1,64}}", own):
             name = own
-        if name is None or name in self._nav_ids:
-            if name is not None:
-                context.notes["task_id appears twice in the scene: named by partition and episode"] += 1
+        if name in self._nav_ids:
+            context.notes["task_id appears twice in the scene: named by partition and episode"] += 1
+        if not name or name in self._nav_ids:
             name = f"{task.scene}-{digest(*(partition.path.parts if partition else [context.label]), task.source_id)}"
         self._nav_ids.add(name)
         task.nav_id = name
-        self._known[task.source_id] = replace(task, route=None)
+        self._tasks[task.source_id] = replace(task, route=None)
 
 
 def _read_trajectory(root: Path, partition: layout.Partition, task: Task, context: Context) -> str | None:
@@ -169,11 +161,9 @@ def _read_trajectory(root: Path, partition: layout.Partition, task: Task, contex
     relative = partition.path / f"{task.source_id}.json"
     label = f"{layout.TRAJECTORIES}/{relative.as_posix()}"
     try:
-        document = Fields(small_document(inside(root, relative.as_posix())), label)
-    except OSError as error:
-        raise BadField("episode_id", f"{label}: {error.strerror}") from None
-    except ValueError as error:
-        raise BadField("episode_id", f"{label}: {error}") from None
+        document = Fields(records.small_document(inside(root, relative.as_posix())), label)
+    except (OSError, ValueError) as error:
+        raise BadField("episode_id", f"{label}: {getattr(error, 'strerror', None) or error}") from None
     version = document.text("schema_version")
     if version != layout.SCHEMA_VERSION:
         raise BadField(document.path("schema_version"), f"{shown(version)}, expected {layout.SCHEMA_VERSION!r}")
@@ -219,7 +209,7 @@ def _agree(partition: layout.Partition, scene: str, word: str, trains: bool) -> 
 
 def _route(document: Fields, context: Context) -> Route:
     steps = document.items("trajectory")
-    words, columns = [], {name: [] for name in _STEP}  # type: tuple[list[str], dict[str, list[Any]]]
+    words: list[str] = []
     more: set[str] = set()
     for k, step in enumerate(steps):
         where = document.path(f"trajectory[{k}]")
@@ -233,15 +223,14 @@ def _route(document: Fields, context: Context) -> Route:
         for name in _STEP:
             if name not in step:
                 raise BadField(f"{where}.{name}", "is missing")
-            columns[name].append(step[name])
-        more.update(step.keys() - _KNOWN)
-    context.notes.update(f"trajectory[].{plain(name)} has no place in the tables" for name in more)
+        more.update(step.keys() - {"action", *_STEP})
+    context.notes.update(f"trajectory[].{records.plain(name)} has no place in the tables" for name in more)
     context.notes.update(
         f"trajectory file: {name.split('.')[-1]} has no place in the tables" for name in document.unread()
     )
-    position, quaternion = _STEP
-    points = positions_of(columns[position], lambda k: document.path(f"trajectory[{k}].{position}"))
-    attitudes = quaternions_of(columns[quaternion], lambda k: document.path(f"trajectory[{k}].{quaternion}"))
+    positions, quaternions = ([step[name] for step in steps] for name in _STEP)
+    points = records.positions_of(positions, lambda k: document.path(f"trajectory[{k}].{_STEP[0]}"))
+    attitudes = records.quaternions_of(quaternions, lambda k: document.path(f"trajectory[{k}].{_STEP[1]}"))
     yaws = context.frame.quaternion_to_world_yaw(attitudes)
     poses = np.column_stack([context.frame.positions_to_world(points), yaws])
     if words[-1] == "stop":

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,53 +17,72 @@ from aerialdojo_gen.base.cli_context import command
 from aerialdojo_gen.base.errors import AssetError, StoreError
 from aerialdojo_gen.base.pictures import REFERENCE_PNG, decode_rgb, encode_png
 from aerialdojo_gen.exchange import aerialdojo_layout as layout
-from aerialdojo_gen.exchange.actions import words_of
 from aerialdojo_gen.exchange.folder import link_or_copy
-from aerialdojo_gen.exchange.frames import NED
+from aerialdojo_gen.exchange.frames import NED, words_of
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.rendering.backend import choose_renderer, scene_renderer
 from aerialdojo_gen.scenes.context import open_scene
 from aerialdojo_gen.scenes.stored import mesh_copy
 from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.files import sha256_of
 from aerialdojo_gen.store.root import DataRoot
 from aerialdojo_gen.store.schemas import DIFFICULTY_COLUMNS, SPLIT_COLUMNS
 
+Row = Mapping[str, Any]
+_PICTURES = "Images"
 # Between two sizes and two renderers edges and shadows' rims differ; another view or object differs by far more.
 _SAME_VIEW = 12.0
+_OWN_PICTURES = "--picture-size 0 exports the release's own pictures"
 
 
-class RerenderedImages:
-    """Draws a scene's reference pictures from where they were taken, at another size than the release has them."""
+class _Pictures:
+    """Puts an object's picture beside every task file that names it: one file, linked, where the disk can.
+
+    With a size it is drawn anew from where it was taken; without one it is the release's own.
+    """
 
     def __init__(self, root: DataRoot, scene: str, size_px: int) -> None:
+        rows = store.read_scene(root, "release/objects", scene).to_pylist()
+        self.objects: dict[int, Row] = {row["object_id"]: row for row in rows}
+        self.first: dict[int, Path] = {}
+        self._scene_name, self._camera = scene, Camera(size_px, size_px) if size_px else None
+        if not size_px:
+            return
         row = store.read_scene(root, "release/scenes", scene).to_pylist()[0]
-        keep = "--picture-size 0 exports the release's own pictures"
         try:
             mesh = mesh_copy(root, row["mesh_path"])
         except FileNotFoundError:
             missing = f"{root.at(row['mesh_path'])} is missing"
-            raise AssetError(f"{missing}, so its pictures cannot be drawn at {size_px} px: {keep}") from None
-        if hashlib.sha256(mesh.read_bytes()).hexdigest() != row["mesh_sha256"]:
-            raise AssetError(f"{mesh} is not the mesh that the release was made from: {keep}")
-        self._scene_name = scene
-        rows = store.read_scene(root, "release/objects", scene).to_pylist()
-        self._poses = {
-            r["object_id"]: [r[f"reference_{name}"] for name in ("x_m", "y_m", "z_m", "yaw_rad")] for r in rows
-        }
-        self._pictures = {r["object_id"]: r["reference_image"] for r in rows}
-        self._camera = Camera(size_px, size_px)
+            raise AssetError(f"{missing}, so its pictures cannot be drawn at {size_px} px: {_OWN_PICTURES}") from None
+        if sha256_of(mesh) != row["mesh_sha256"]:
+            raise AssetError(f"{mesh} is not the mesh that the release was made from: {_OWN_PICTURES}")
         self._scene = open_scene(mesh, row["mesh_sha256"]).scene
         self._renderer_name = choose_renderer("auto").name
 
-    def picture(self, object_id: int) -> bytes:
-        """Draw an object's picture."""
-        x, y, z, yaw = self._poses[object_id]
-        pose = view_pose((x, y, z), yaw, "front")
-        rgb = scene_renderer(self._scene, self._renderer_name).render(self._camera, pose).rgb
-        if _image_difference(rgb, self._pictures[object_id]) > _SAME_VIEW:
+    def place(self, folder: Path, object_id: int) -> str:
+        """Put a picture below a task file's folder; returns its path relative to it."""
+        name, picture = (self.objects[object_id][key] for key in ("reference_image_id", "reference_image"))
+        if not re.fullmatch(r"[A-Za-z0-9_-]{1,100}", name):
+            raise StoreError(f"objects of {self._scene_name}: reference_image_id {name!r} cannot name a file")
+        path = folder / _PICTURES / f"{name}.png"
+        if object_id not in self.first:
+            if picture is None:
+                raise StoreError(f"object {object_id} of {self._scene_name} has no reference image: "
+                                 f"run {command('split', scene=self._scene_name)}")  # fmt: skip
+            path.parent.mkdir(exist_ok=True)
+            path.write_bytes(picture if self._camera is None else self._draw(self._camera, object_id, picture))
+            self.first[object_id] = path
+        elif not path.exists():
+            link_or_copy(self.first[object_id], path)
+        return f"{_PICTURES}/{path.name}"
+
+    def _draw(self, camera: Camera, object_id: int, picture: bytes) -> bytes:
+        *place, yaw = (self.objects[object_id][f"reference_{name}"] for name in ("x_m", "y_m", "z_m", "yaw_rad"))
+        pose = view_pose(place, yaw, "front")
+        rgb = scene_renderer(self._scene, self._renderer_name).render(camera, pose).rgb
+        if _image_difference(rgb, picture) > _SAME_VIEW:
             raise StoreError(
-                f"object {object_id} of {self._scene_name} does not look as its picture does: "
-                "--picture-size 0 exports the release's own pictures"
+                f"object {object_id} of {self._scene_name} does not look as its picture does: {_OWN_PICTURES}"
             )
         return encode_png(rgb, REFERENCE_PNG)
 
@@ -78,9 +96,6 @@ def _image_difference(rgb: NDArray[np.uint8], picture: bytes) -> float:
     small = [cv2.resize(image, (side, side), interpolation=cv2.INTER_AREA) for image in (rgb, released)]
     return float(np.abs(small[0].astype(np.float32) - small[1].astype(np.float32)).mean())
 
-
-Floats = NDArray[np.float64]
-Row = Mapping[str, Any]
 
 # What the layout has no field for; sizes of actions are in the poses, trajectory_id is the nav_id.
 LOST: Mapping[str, Sequence[str]] = {
@@ -100,37 +115,32 @@ LOST: Mapping[str, Sequence[str]] = {
 
 _ENDS = ["nav_id", "start_object_id", "target_object_id", "goal_x_m", "goal_y_m", "goal_z_m", "length_m",
          "euclidean_m", "detour_ratio"]  # fmt: skip
-_PICTURES = "Images"
 _COORDINATES = "ProjectAirSim NED"
 
 
 def write_scene(data: DataRoot, scene: str, root: Path, picture_px: int = 0) -> dict[str, int]:
     """Write a scene's tasks, pictures and trajectories; a partition without tasks is an empty list."""
-    objects = {row["object_id"]: row for row in store.read_scene(data, "release/objects", scene).to_pylist()}
-    draw = RerenderedImages(data, scene, picture_px) if picture_px else None
-    pictures = _Pictures(scene, objects, draw)
+    pictures = _Pictures(data, scene, picture_px)
     counts = dict.fromkeys(("task files", "tasks", "trajectories"), 0)
     for subset in ("train", "test"):
         tasks = store.read_scene(data, f"tasks/{subset}", scene)
         routes = store.read_scene(data, f"routes/{subset}", scene)
         for setting in layout.SETTING_WORDS:
             chosen = routes.filter(pa.compute.equal(routes["setting"], setting)).sort_by("nav_id")
-            episodes = {nav_id: str(k) for k, nav_id in enumerate(chosen["nav_id"].to_pylist())}
-            mine = tasks.filter(pa.compute.equal(tasks["setting"], setting)).sort_by("nav_id").to_pylist()
+            own = tasks.filter(pa.compute.equal(tasks["setting"], setting)).sort_by("nav_id").to_pylist()
             partition = layout.partition_of(scene, setting, store.partition(scene).upper(), subset)
-            ends = {row["nav_id"]: row for row in chosen.select(_ENDS).to_pylist()}
+            # Episodes are numbered by their places in the table.
+            ends = {row["nav_id"]: (str(k), row) for k, row in enumerate(chosen.select(_ENDS).to_pylist())}
             for kind, modality in layout.KINDS.items():
-                rows = [row for row in mine if row["modality"] == modality]
+                rows = [row for row in own if row["modality"] == modality]
                 folder = root / kind / partition.path
                 folder.mkdir(parents=True)
-                tasks_of = (
-                    _task(row, episodes[row["nav_id"]], ends[row["nav_id"]], pictures, folder) for row in rows
-                )
-                lines = ",\n".join(map(_text, tasks_of))
+                lines = ",\n".join(_text(_task(row, *ends[row["nav_id"]], pictures, folder)) for row in rows)
                 (folder / layout.TASK_FILE).write_text(f"[\n{lines}\n]\n" if rows else "[]\n", encoding="utf-8")
                 counts["task files"] += 1
                 counts["tasks"] += len(rows)
-            counts["trajectories"] += _write_trajectories(root, partition, chosen, episodes, objects)
+            _write_trajectories(root / layout.TRAJECTORIES / partition.path, scene, chosen, pictures.objects)
+            counts["trajectories"] += chosen.num_rows
     return counts | {"pictures": len(pictures.first)}
 
 
@@ -170,63 +180,23 @@ def _text(record: Mapping[str, Any]) -> str:
     return json.dumps(record, ensure_ascii=False, allow_nan=False)
 
 
-class _Pictures:
-    """Puts an object's picture beside every task file that names it: one file, linked, where the disk can."""
-
-    def __init__(self, scene: str, objects: Mapping[int, Row], draw: RerenderedImages | None) -> None:
-        self.objects = objects
-        self._scene, self._draw = scene, draw
-        self.first: dict[int, Path] = {}
-
-    def place(self, folder: Path, object_id: int) -> str:
-        """Put a picture below a task file's folder; returns its path relative to it."""
-        name = self.objects[object_id]["reference_image_id"]
-        if not re.fullmatch(r"[A-Za-z0-9_-]{1,100}", name):
-            raise StoreError(f"objects of {self._scene}: reference_image_id {name!r} cannot name a file")
-        path = folder / _PICTURES / f"{name}.png"
-        if object_id not in self.first:
-            picture = self.objects[object_id]["reference_image"]
-            if picture is None:
-                raise StoreError(f"object {object_id} of {self._scene} has no reference image: "
-                                 f"run {command('split', scene=self._scene)}")  # fmt: skip
-            path.parent.mkdir(exist_ok=True)
-            path.write_bytes(self._draw.picture(object_id) if self._draw else picture)
-            self.first[object_id] = path
-        elif not path.exists():
-            link_or_copy(self.first[object_id], path)
-        return f"{_PICTURES}/{path.name}"
-
-
-def _write_trajectories(
-    root: Path, partition: layout.Partition, routes: pa.Table, episodes: Mapping[str, str], objects: Mapping[int, Row]
-) -> int:
-    folder = root / layout.TRAJECTORIES / partition.path
+def _write_trajectories(folder: Path, scene: str, routes: pa.Table, objects: Mapping[int, Row]) -> None:
     folder.mkdir(parents=True)
-    for row, poses, actions in _poses(routes):
+    rows = (row for batch in routes.to_batches(max_chunksize=1024) for row in batch.to_pylist())
+    for k, row in enumerate(rows):
+        poses = np.column_stack([row[name] for name in ("x_m", "y_m", "z_m", "yaw_rad")])
+        words = words_of(np.array(row["action"], np.int8), poses)
         positions = NED.positions_from_world(poses[:, :3]).tolist()
         quaternions = NED.quaternion_from_world_yaw(poses[:, 3]).tolist()
         document = {
             "schema_version": layout.SCHEMA_VERSION,
-            "map_name": partition.scene,
+            "map_name": scene,
             "task_id": f"{row['start_object_id']}_{row['start_anchor_id']}__{row['target_object_id']}",
             "status": "planned",
             "goal": {"Object_name": objects[row["target_object_id"]]["mesh_node"]},
             "trajectory": [
                 {"action": word, "position_ned_m": position, "quaternion_xyzw": quaternion}
-                for word, position, quaternion in zip(words_of(actions, poses), positions, quaternions, strict=True)
+                for word, position, quaternion in zip(words, positions, quaternions, strict=True)
             ],
         }
-        (folder / f"{episodes[row['nav_id']]}.json").write_text(_text(document), encoding="utf-8")
-    return routes.num_rows
-
-
-def _poses(routes: pa.Table) -> Iterator[tuple[dict[str, Any], Floats, NDArray[np.int8]]]:
-    """The routes, each with its poses, (n, 4), and actions, (n,)."""
-    lists = {name: routes[name].combine_chunks() for name in ("x_m", "y_m", "z_m", "yaw_rad", "action")}
-    flat = {name: column.flatten().to_numpy() for name, column in lists.items()}
-    bounds = np.concatenate([[0], np.cumsum(lists["action"].value_lengths().to_numpy())])
-    columns = ["nav_id", "start_object_id", "start_anchor_id", "target_object_id"]
-    for k, row in enumerate(routes.select(columns).to_pylist()):
-        part = slice(bounds[k], bounds[k + 1])
-        poses = np.column_stack([flat[name][part] for name in ("x_m", "y_m", "z_m", "yaw_rad")])
-        yield row, poses, flat["action"][part]
+        (folder / f"{k}.json").write_text(_text(document), encoding="utf-8")

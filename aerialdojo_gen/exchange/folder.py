@@ -43,10 +43,14 @@ def check_target(target: Path, marker: str, *, force: bool) -> None:
         ours = (target / marker).is_file()
     except OSError as error:
         raise disk_error(error, target) from None
+    _refuse_taken(str(target), taken, ours, marker, force)
+
+
+def _refuse_taken(place: str, taken: bool, ours: bool, marker: str, force: bool) -> None:
     if taken and not ours:
-        raise UsageError(f"{target} exists and holds no {marker}: name another folder")
+        raise UsageError(f"{place} exists and holds no {marker}: name another folder")
     if taken and not force:
-        raise UsageError(f"{target} exists: --force replaces it")
+        raise UsageError(f"{place} exists: --force replaces it")
 
 
 @contextlib.contextmanager
@@ -56,11 +60,8 @@ def whole_folder_below(root: DataRoot, relative: str, marker: str, *, force: boo
         with whole_folder(root.path / relative, marker, force=force) as temporary:
             yield temporary
         return
-    if root.exists(relative):
-        if not root.exists(f"{relative}/{marker}"):
-            raise UsageError(f"{root.at(relative)} exists and holds no {marker}: name another folder")
-        if not force:
-            raise UsageError(f"{root.at(relative)} exists: --force replaces it")
+    taken, ours = root.exists(relative), root.exists(f"{relative}/{marker}")
+    _refuse_taken(root.at(relative), taken, ours, marker, force)
     with root.commit_folder(relative) as temporary:
         yield temporary
 
@@ -136,17 +137,15 @@ class PartialExport:
             yield
 
     def _begin(self) -> None:
-        path = self.folder / _REQUEST
-        try:
-            same = loads_json(path.read_text(encoding="utf-8")) == self._request
-        except (OSError, ValueError, Malformed):
-            same = False
+        parts, same = self.folder / "parts", False
+        with contextlib.suppress(OSError, ValueError, Malformed):
+            same = loads_json((self.folder / _REQUEST).read_text(encoding="utf-8")) == self._request
         if not same:
-            remove(self.folder / "parts")
+            remove(parts)
             with atomic_file(self.folder, _REQUEST) as temporary:
                 temporary.write_text(json.dumps(self._request, sort_keys=True), encoding="utf-8")
-        make_folder(self.folder / "parts")
-        self.resumed = same and any((self.folder / "parts").iterdir())
+        make_folder(parts)
+        self.resumed = same and any(parts.iterdir())
 
     def part(self, number: int) -> Path:
         """Return where a part lies, whose folder appears when it is finished."""

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
-from aerialdojo_gen.exchange.frames import world_to_habitat, yaw_to_habitat_quaternion_xyzw
+from aerialdojo_gen.exchange.frames import HABITAT, yaw_to_habitat_quaternion_xyzw
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import DataRoot
 from aerialdojo_gen.store.schemas import DIFFICULTY_COLUMNS, SPLIT_COLUMNS, SUBSETS
@@ -38,10 +38,8 @@ LOST: Mapping[str, Sequence[str]] = {
 
 def categories_of(data: DataRoot, scenes: Sequence[str]) -> dict[str, int]:
     """Number the categories of the scenes' objects, by name."""
-    found: set[str] = set()
-    for scene in scenes:
-        found.update(store.read_scene(data, "release/objects", scene, ["category"])["category"].to_pylist())
-    return {name: k for k, name in enumerate(sorted(found))}
+    columns = (store.read_scene(data, "release/objects", scene, ["category"])["category"] for scene in scenes)
+    return {name: k for k, name in enumerate(sorted({name for column in columns for name in column.to_pylist()}))}
 
 
 def write_index(root: Path, categories: Mapping[str, int]) -> None:
@@ -94,17 +92,12 @@ def _gzip(path: Path) -> Iterator[gzip.GzipFile]:
 
 
 def _goal(row: Mapping[str, Any], anchors: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    views = [
-        {
-            "agent_state": {
-                "position": _position(anchor),
-                "rotation": yaw_to_habitat_quaternion_xyzw(anchor["yaw_rad"]).tolist(),
-            },
-            # Habitat's iou is the share of the view that the object covers: known where there is a picture.
-            "iou": row["image_fraction"] if anchor["selected"] else None,
-        }
-        for anchor in anchors
-    ]
+    views = []
+    for anchor in anchors:
+        rotation = yaw_to_habitat_quaternion_xyzw(anchor["yaw_rad"]).tolist()
+        # Habitat's iou is the share of the view that the object covers: known where there is a picture.
+        iou = row["image_fraction"] if anchor["selected"] else None
+        views.append({"agent_state": {"position": _position(anchor), "rotation": rotation}, "iou": iou})
     return {
         "object_id": row["object_id"],
         "object_name": row["name"],
@@ -116,18 +109,15 @@ def _goal(row: Mapping[str, Any], anchors: Sequence[Mapping[str, Any]]) -> dict[
 
 
 def _position(row: Mapping[str, Any], prefix: str = "") -> list[float]:
-    return world_to_habitat([row[f"{prefix}{a}_m"] for a in "xyz"]).tolist()
+    return HABITAT.positions_from_world([row[f"{prefix}{a}_m"] for a in "xyz"]).tolist()
 
 
 def _episodes(routes: pa.Table, mesh: str, category_of: Mapping[int, str]) -> Iterator[dict[str, Any]]:
     for batch in routes.to_batches(max_chunksize=1024):
         for row in batch.to_pylist():
-            positions = world_to_habitat(np.column_stack([row["x_m"], row["y_m"], row["z_m"]])).tolist()
+            positions = HABITAT.positions_from_world(np.column_stack([row["x_m"], row["y_m"], row["z_m"]])).tolist()
             rotations = yaw_to_habitat_quaternion_xyzw(row["yaw_rad"]).tolist()
-            points = [
-                {"position": position, "rotation": rotation, "action": action}
-                for position, rotation, action in zip(positions, rotations, row["action"], strict=True)
-            ]
+            points = zip(positions, rotations, row["action"], strict=True)
             yield {
                 "scene_id": mesh,
                 "scene_dataset_config": "default",
@@ -142,6 +132,6 @@ def _episodes(routes: pa.Table, mesh: str, category_of: Mapping[int, str]) -> It
                     "setting": row["setting"],
                 },
                 "goals": [],
-                "shortest_paths": [points],
+                "shortest_paths": [[dict(zip(("position", "rotation", "action"), of, strict=True)) for of in points]],
                 "object_category": category_of[row["target_object_id"]],
             }

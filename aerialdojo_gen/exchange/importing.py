@@ -6,23 +6,20 @@ import os
 from array import array
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TextIO
 
 import numpy as np
 
-from aerialdojo_gen.base.errors import ImportRefused, StoreError, UsageError, brief
-from aerialdojo_gen.base.names import unknown
+from aerialdojo_gen.base.errors import ImportRefused, UsageError, brief
+from aerialdojo_gen.base.names import check_known
 from aerialdojo_gen.exchange import aerialdojo_reader, readers
-from aerialdojo_gen.exchange.fields import BadField, Fields
 from aerialdojo_gen.exchange.folder import whole_folder_below, write_json
-from aerialdojo_gen.exchange.frames import FRAMES, Frame, frame_named
-from aerialdojo_gen.exchange.jsonstream import RECORD_LIMIT, records
-from aerialdojo_gen.exchange.tables import IMPORTED_OBJECTS, IMPORTED_ROUTES, IMPORTED_TASKS, Tables
-from aerialdojo_gen.exchange.task import Context, Task, digest, route_row, task_rows
-from aerialdojo_gen.store.layout import check_scene_name
+from aerialdojo_gen.exchange.frames import FRAMES, Frame
+from aerialdojo_gen.exchange.records import BadField, Fields, records, shown
+from aerialdojo_gen.exchange.task import Context, Tables, Task, digest, route_row, task_rows
+from aerialdojo_gen.store.layout import is_plain
 from aerialdojo_gen.store.root import Where, open_root
 
 _MAX_NAMED = 1000
@@ -44,7 +41,7 @@ class Report:
     notes: Counter[str] = field(default_factory=Counter)  # Else worth knowing, and of how many records
     rows: dict[str, int] = field(default_factory=dict)
     empty: dict[str, int] = field(default_factory=dict)
-    _errors: array[float] = field(default_factory=lambda: array("d"))
+    errors_m: array[float] = field(default_factory=lambda: array("d"))  # Replay errors of routes
 
     def refuse(self, label: str, row: int, error: BadField) -> str:
         """Count a bad record; returns its line."""
@@ -61,28 +58,22 @@ class Report:
             known = name in self.unmapped or len(self.unmapped) < _MAX_NAMED
             self.unmapped[name if known else "(others)"] += 1
 
-    def replayed(self, error_m: float | None) -> None:
-        """Count a route's replay error."""
-        if error_m is not None:
-            self._errors.append(error_m)
-
     def replay(self) -> dict[str, Any] | None:
         """Summarise the replay errors, metres; None where no record has actions and poses."""
-        if not self._errors:
+        if not self.errors_m:
             return None
-        errors = np.asarray(self._errors)
+        errors = np.asarray(self.errors_m)
         median_m, max_m = (round(float(value), 6) for value in (np.median(errors), errors.max()))
         far = int((errors > _FAR_M).sum())
         return {"routes": len(errors), "median_m": median_m, "max_m": max_m, f"over_{_FAR_M:g}_m": far}
 
     def document(self) -> dict[str, Any]:
         """All of it, for ``import.json``."""
-        counted = {"bad_fields": self.bad_fields, "not_mapped": self.unmapped, "null_columns": self.empty}
-        counted |= {"notes": self.notes}
         return {
             "format": self.format, "frame": self.frame, "files": self.files, "records": self.records,
-            "rows": self.rows, "bad_records": self.n_bad,
-            **{name: dict(sorted(counts.items())) for name, counts in counted.items()}, "replay_error": self.replay(),
+            "rows": self.rows, "bad_records": self.n_bad, "bad_fields": dict(sorted(self.bad_fields.items())),
+            "not_mapped": dict(sorted(self.unmapped.items())), "null_columns": dict(sorted(self.empty.items())),
+            "notes": dict(sorted(self.notes.items())), "replay_error": self.replay(),
         }  # fmt: skip
 
     def lines(self) -> list[str]:
@@ -117,7 +108,7 @@ class Objects:
     def __init__(self) -> None:
         self._numbers: dict[str, dict[object, int]] = {}
         self._rows: dict[tuple[str, int], dict[str, Any]] = {}
-        self._pictures: dict[tuple[str, int], dict[str, Path]] = {}
+        self._pictures: dict[tuple[str, int], dict[str, Path | None]] = {}
         self._owners: dict[str, tuple[str, int]] = {}
 
     def number(self, task: Task) -> int | None:
@@ -134,7 +125,7 @@ class Objects:
         known = task.known
         texts = [i.description for i in task.instances if i.description]
         row = {name: known.get(name) for name in ("mesh_node", "category", "direction", "landmark")}
-        row |= {"name": known.get("target_name"), "description": texts[0] if texts else known.get("description")}
+        row |= {"name": known.get("target_name"), "description": next(iter(texts), known.get("description"))}
         if task.object_m is not None:
             row |= dict(zip(("x_m", "y_m", "z_m"), task.object_m.tolist(), strict=True))
         self._merge(task.scene, number, row)
@@ -159,13 +150,10 @@ class Objects:
     def write(self, tables: Tables) -> None:
         """Write the rows, one an object and picture, by scene and number."""
         for scene, number in sorted(self._rows):
-            empty = dict.fromkeys(IMPORTED_OBJECTS.schema.names)
-            row = empty | self._rows[scene, number] | {"scene": scene, "object_id": number}
-            found = sorted(self._pictures.get((scene, number), {}).items())
-            pictures: list[tuple[str, Path | None]] = [*found] or [("", None)]
-            for name, picture in pictures:
-                data = None if picture is None else picture.read_bytes()
-                tables.add(IMPORTED_OBJECTS, {**row, "reference_image_id": name, "reference_image": data})
+            row = self._rows[scene, number] | {"scene": scene, "object_id": number}
+            for name, picture in sorted(self._pictures.get((scene, number), {"": None}).items()):
+                data = picture and picture.read_bytes()
+                tables.add("objects", {**row, "reference_image_id": name, "reference_image": data})
 
 
 MARKER = "import.json"
@@ -176,17 +164,17 @@ Read = Callable[[Fields, Context], Task]
 class Format:
     """A format that can be imported."""
 
-    reader: Callable[[], Read]  # Makes what reads the records of one import
+    read: Read | None  # Reads a record; None where a reader of its own remembers those before
     key: str | None = None  # Where the list of records stands; None: it is the whole file
     frame: str | None = "ned"  # Its frame; None where the format does not state it
 
 
 FORMATS = {
-    "aerialdojo": Format(lambda: aerialdojo_reader.Reader().read),
-    "uav-on": Format(lambda: readers.read_uav_on),
-    "cityavos": Format(lambda: readers.read_cityavos, frame=None),
-    "aerialvln": Format(lambda: readers.read_aerialvln, key="episodes"),
-    "openfly": Format(lambda: readers.read_openfly, frame=None),
+    "aerialdojo": Format(None),
+    "uav-on": Format(readers.read_uav_on),
+    "cityavos": Format(readers.read_cityavos, frame=None),
+    "aerialvln": Format(readers.read_aerialvln, key="episodes"),
+    "openfly": Format(readers.read_openfly, frame=None),
 }
 
 
@@ -199,7 +187,6 @@ class Options:
     pictures: Path | None = None  # Folder below which CityAVOS's pictures lie; None: the file's own
     with_pictures: bool = True  # False: leave pictures aside, and the image instances of CityAVOS with them
     skip_bad: bool = False  # Keep the good records of files that have bad ones
-    record_limit: int = RECORD_LIMIT  # Most characters of a record
 
 
 def import_benchmark(
@@ -213,20 +200,21 @@ def import_benchmark(
 ) -> Report:
     """Import others' task files as tables; for damaged files, or bad records that are not skipped, write nothing."""
     options = options or Options()
-    if format_name not in FORMATS:
-        raise UsageError(unknown("no format", format_name, FORMATS))
+    check_known("no format", [format_name], FORMATS)
     chosen = FORMATS[format_name]
     frame = _frame(format_name, chosen, options.frame)
     if options.angles not in ("radians", "degrees", "mixed"):
         raise UsageError(f"angles are radians, degrees or mixed, not {options.angles!r}")
     sources = _sources(format_name, files)
     report = Report(format_name, frame.name)
-    root, target = open_root(data), f"imported/{_plain(name or format_name)}"
-    with whole_folder_below(root, target, MARKER, force=force) as folder, ExitStack() as stack:
-        bad = stack.enter_context((folder / "bad_records.txt").open("w", encoding="utf-8"))
+    if not is_plain(name or format_name):
+        raise UsageError(f"{name!r} cannot name an import: use letters, digits, _ and - (64 at most)")
+    root, target = open_root(data), f"imported/{name or format_name}"
+    with whole_folder_below(root, target, MARKER, force=force) as folder:
         tables, objects = Tables(folder), Objects()
-        for task, source in _tasks(sources, chosen, frame, options, report, bad):
-            _write(task, source, tables, objects, report)
+        with (folder / "bad_records.txt").open("w", encoding="utf-8") as bad:
+            for task, source in _tasks(sources, chosen, frame, options, report, bad):
+                _write(task, source, tables, objects, report)
         if report.n_bad and not options.skip_bad:
             more = [f"and {report.n_bad - len(report.bad):,} more"] if report.n_bad > len(report.bad) else []
             head = f"{report.n_bad:,} of {report.records:,} records are bad, nothing is written"
@@ -235,7 +223,6 @@ def import_benchmark(
         tables.close()
         report.rows = dict(tables.written)
         report.empty = {column: n for column, n in tables.nulls.items() if n}
-        bad.close()
         if not report.n_bad:
             (folder / "bad_records.txt").unlink()
         write_json(folder / MARKER, report.document())
@@ -243,20 +230,14 @@ def import_benchmark(
 
 
 def _frame(format_name: str, chosen: Format, asked: str | None) -> Frame:
-    if chosen.frame is not None:
-        if asked not in (None, chosen.frame):
-            raise UsageError(f"{format_name} files are {chosen.frame} by their format: leave --frame out")
-        return frame_named(chosen.frame)
-    if asked is None:
+    if chosen.frame and asked not in (None, chosen.frame):
+        raise UsageError(f"{format_name} files are {chosen.frame} by their format: leave --frame out")
+    name = chosen.frame or asked
+    if name is None:
         raise UsageError(f"{format_name} files do not say which way their axes point: --frame {'|'.join(FRAMES)}")
-    return frame_named(asked)
-
-
-def _plain(name: str) -> str:
-    try:
-        return check_scene_name(name)
-    except StoreError:
-        raise UsageError(f"{name!r} cannot name an import: use letters, digits, _ and - (64 at most)") from None
+    if name not in FRAMES:
+        raise UsageError(f"no frame {name!r}: it is one of {', '.join(FRAMES)} (the directions of x, y and z)")
+    return FRAMES[name]
 
 
 def _sources(format_name: str, files: Sequence[Path]) -> list[tuple[str, Path]]:
@@ -265,8 +246,7 @@ def _sources(format_name: str, files: Sequence[Path]) -> list[tuple[str, Path]]:
     for path in files:
         if not path.exists():
             raise UsageError(f"there is no file {path}")
-        expanded = aerialdojo_reader.task_files(path) if format_name == "aerialdojo" else [path]
-        for file in expanded:
+        for file in aerialdojo_reader.task_files(path) if format_name == "aerialdojo" else [path]:
             if not file.is_file():
                 raise UsageError(f"{file} is no file")
             found.setdefault(file.absolute())
@@ -286,35 +266,30 @@ def _sources(format_name: str, files: Sequence[Path]) -> list[tuple[str, Path]]:
 def _tasks(
     sources: Sequence[tuple[str, Path]], chosen: Format, frame: Frame, options: Options, report: Report, bad: TextIO
 ) -> Iterator[tuple[Task, dict[str, Any]]]:
-    read = chosen.reader()
+    read = chosen.read or aerialdojo_reader.Reader().read
     for label, path in sources:
         report.files.append(label)
         pictures = (options.pictures or path.parent) if options.with_pictures else None
-        seen: set[str] = set()
-        for row, value in enumerate(records(path, chosen.key, limit=options.record_limit)):
+        ids: set[str] = set()
+        for row, value in enumerate(records(path, chosen.key)):
             report.records += 1
             # Notes count only if the record turns out good.
-            context = Context(path, label, frame, options.angles, pictures, type(report.notes)())
+            context = Context(path, label, frame, options.angles, pictures, Counter())
             try:
                 record = Fields(value)
                 task = read(record, context)
-                _check(task, seen)
+                if not is_plain(task.scene):
+                    why = "is not a scene name: use letters, digits, _ and - (64 at most)"
+                    raise BadField("scene", f"{shown(task.scene)} {why}")
+                if task.source_id in ids:
+                    raise BadField("id", f"{brief(task.source_id, 60)} appears twice in the file")
             except BadField as error:
                 bad.write(report.refuse(label, row, error) + "\n")
                 continue
+            ids.add(task.source_id)
             report.left(record.unread())
             report.notes.update(context.notes)
             yield task, {"source_file": label, "source_row": row, "source_id": task.source_id}
-
-
-def _check(task: Task, seen: set[str]) -> None:
-    try:
-        check_scene_name(task.scene)
-    except StoreError as error:
-        raise BadField("scene", str(error)) from None
-    if task.source_id in seen:
-        raise BadField("id", f"{brief(task.source_id, 60)} appears twice in the file")
-    seen.add(task.source_id)
 
 
 def _write(task: Task, source: dict[str, Any], tables: Tables, objects: Objects, report: Report) -> None:
@@ -325,8 +300,8 @@ def _write(task: Task, source: dict[str, Any], tables: Tables, objects: Objects,
         task.known["target_object_id"] = number
         pictures = objects.add(task, number)
     for row in task_rows(task, nav_id, source, pictures):
-        tables.add(IMPORTED_TASKS, row)
+        tables.add("tasks", row)
     if task.has_route_row:
-        tables.add(IMPORTED_ROUTES, route_row(task, nav_id, source))
+        tables.add("routes", route_row(task, nav_id, source))
         if task.route is not None:
-            report.replayed(task.route.replay_error_m)
+            report.errors_m.append(task.route.replay_error_m)

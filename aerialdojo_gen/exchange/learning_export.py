@@ -7,6 +7,7 @@ import json
 import shutil
 import time
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -58,14 +59,12 @@ class Estimate:
     measured: int  # Frames that were drawn and encoded to find out
 
     def __str__(self) -> str:
-        """Two lines for people."""
         size = f"{self.size_bytes / 1e9:.1f} GB" if self.size_bytes >= 1e9 else f"{self.size_bytes / 1e6:.0f} MB"
-        processes = "worker" if self.workers == 1 else "workers"
         each = 1e3 * self.cpu_s / self.frames
         return (
             f"{self.trajectories:,} trajectories, {self.frames:,} frames (measured on {self.measured}: {each:.1f} ms "
-            f"CPU, {self.size_bytes / self.frames / 1e3:.1f} kB a frame)\n"
-            f"about {duration(self.wall_s)} with {self.workers} {processes} on idle cores, {size} on disk"
+            f"CPU, {self.size_bytes / self.frames / 1e3:.1f} kB a frame)\nabout {duration(self.wall_s)} with "
+            f"{self.workers} worker{'s' * (self.workers != 1)} on idle cores, {size} on disk"
         )
 
 
@@ -80,28 +79,26 @@ def export_for_learning(
     reporter: Reporter | None = None,
 ) -> ExportResult:
     """Write trajectories with what the body sees on them, as a data set for training."""
-    writer = _writer(format_name, options)
-    progress = reporter or Reporter(quiet=True)
+    writer, root, progress = _writer(format_name, options), open_root(data), reporter or Reporter(quiet=True)
     check_target(out, MARKER, force=force)
-    root = open_root(data)
     parts = plan_parts(root, options, writer.frames_a_part(options))
     unfinished = PartialExport(out, _request(format_name, root, options, parts))
     with unfinished.locked():
         left = [part for part in parts if not unfinished.part(part.number).is_dir()]
         if unfinished.resumed:
             progress.line(f"going on: {len(parts) - len(left)} of {len(parts)} parts are finished")
-        jobs = [_Job(format_name, root.url, options, part, unfinished.part(part.number)) for part in left]
-        with progress.bar("export", len(jobs), "parts") as bar, make_executor("local", workers) as pool:
-            for outcome in pool.map(_write, jobs, lambda job: job.part.scene):
+        write = partial(_write, format_name, root.url, options, unfinished)
+        with progress.bar("export", len(left), "parts") as bar, make_executor("local", workers) as pool:
+            for outcome in pool.map(write, left, lambda part: part.scene):
                 if isinstance(outcome, AerialDojoError):
                     raise outcome
                 bar.advance(frames=outcome)
         with whole_folder(out, MARKER, force=force) as folder:
-            made = [unfinished.part(part.number) for part in parts]
-            counts = {"scenes": len({part.scene for part in parts})} | writer.finish(parts, options, made, folder)
+            scenes, made = sorted({part.scene for part in parts}), [unfinished.part(part.number) for part in parts]
+            counts = {"scenes": len(scenes)} | writer.finish(parts, options, made, folder)
             write_marker(
-                folder, format_name, FRAME, scenes=sorted({part.scene for part in parts}), counts=counts,
-                wanted=_requested(options), actions=dict(enumerate(ACTION_NAMES[:16])), lost=LOST,
+                folder, format_name, FRAME, scenes=scenes, counts=counts, wanted=_requested(options),
+                actions=dict(enumerate(ACTION_NAMES[:16])), lost=LOST,
             )  # fmt: skip
         shutil.rmtree(unfinished.folder, ignore_errors=True)
     return ExportResult(counts, len(parts), len(parts) - len(left))
@@ -111,8 +108,7 @@ def estimate_for_learning(
     format_name: str, data: Where, options: ExportOptions, workers: int | None = None
 ) -> Estimate:  # fmt: skip
     """Measure a few trajectories and say what all of them will take; nothing is written."""
-    writer = _writer(format_name, options)
-    root = open_root(data)
+    writer, root = _writer(format_name, options), open_root(data)
     parts = plan_parts(root, options, writer.frames_a_part(options))
     drawn = sorted(parts, key=lambda part: rng.rank(options.seed, "estimate", part.scene))[:_MEASURED_PARTS]
     measured = size = 0
@@ -150,25 +146,10 @@ def _writer(format_name: str, options: ExportOptions) -> ModuleType:
     return WRITERS[format_name]
 
 
-@dataclass(frozen=True, eq=False)
-class _Job:
-    """A part to be written, wherever."""
-
-    format_name: str
-    data: str
-    options: ExportOptions
-    part: Part
-    place: Path  # Of its folder among the finished parts
-
-    @property
-    def label(self) -> str:
-        return f"part {self.part.number} of {self.part.scene}"
-
-
-def _write(job: _Job) -> int:
-    with atomic_folder(job.place, job.place.parents[1]) as folder:
-        WRITERS[job.format_name].write_part(open_root(job.data), job.part, job.options, folder)
-    return job.part.frames
+def _write(format_name: str, data: str, options: ExportOptions, unfinished: PartialExport, part: Part) -> int:
+    with atomic_folder(unfinished.part(part.number), unfinished.folder) as folder:
+        WRITERS[format_name].write_part(open_root(data), part, options, folder)
+    return part.frames
 
 
 def _request(format_name: str, root: DataRoot, options: ExportOptions, parts: list[Part]) -> dict[str, Any]:
@@ -183,15 +164,14 @@ def _request(format_name: str, root: DataRoot, options: ExportOptions, parts: li
         "trajectories": [part.index.digest for part in parts],
         "meshes": {} if options.source == "recordings" else {name: mesh_of(root, name)[1] for name in scenes},
         "goals": {name: root.digest(part_name("release/objects", name)) for name in scenes} if shown else {},
-        "recordings": {name: _recordings(root, name) for name in scenes} if read else {},
+        "recordings": {
+            name: sorted(store.read_stored(root, "recordings", name, ("sha256",))["sha256"].to_pylist())
+            if root.list("recordings", f"{name}/*.parquet")
+            else []
+            for name in (scenes if read else ())
+        },
     }
 
 
 def _requested(options: ExportOptions) -> Any:
     return json.loads(json.dumps(dataclasses.asdict(options)))
-
-
-def _recordings(root: DataRoot, scene: str) -> list[str]:
-    if not root.list("recordings", f"{scene}/*.parquet"):
-        return []
-    return sorted(store.read_stored(root, "recordings", scene, ("sha256",))["sha256"].to_pylist())

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import json
-from contextlib import ExitStack
+import math
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
+import av
 import cv2
 import numpy as np
 import pyarrow as pa
@@ -14,17 +18,8 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.exchange.folder import link_or_copy, write_json
 from aerialdojo_gen.exchange.samples import ExportOptions, Part, SampleFrames
-from aerialdojo_gen.exchange.video_clips import (
-    DEPTH_CODES,
-    DEPTH_MIN_M,
-    DEPTH_SHIFT_M,
-    KEY_EVERY,
-    Clip,
-    depth_codes,
-    depths_of_codes_m,
-)
 from aerialdojo_gen.geometry.motion import DISPLACEMENTS, TURN_RAD
-from aerialdojo_gen.learning.labels import Labels
+from aerialdojo_gen.learning.labels import labels_at
 from aerialdojo_gen.store.parquet_files import read_file, write_file
 from aerialdojo_gen.store.root import DataRoot
 from aerialdojo_gen.store.schemas import STOP, TURN_LEFT, TURN_RIGHT
@@ -77,10 +72,10 @@ def video_kinds(options: ExportOptions) -> dict[str, str]:
 
 def features(options: ExportOptions) -> dict[str, dict[str, Any]]:
     """Return the features of frames: their types, shapes, names, and how videos are to be read."""
-    found = {key: _video(options, kind) for key, kind in video_kinds(options).items()}
-    for name, (dtype, names) in _NUMBERS.items():
-        found[name] = {"dtype": dtype, "shape": [len(names) if names else 1], "names": names and [*names]}
-    return found
+    return {key: _video(options, kind) for key, kind in video_kinds(options).items()} | {
+        name: {"dtype": dtype, "shape": [len(names) if names else 1], "names": names and [*names]}
+        for name, (dtype, names) in _NUMBERS.items()
+    }
 
 
 def frame_schema() -> pa.Schema:
@@ -94,10 +89,10 @@ def frame_schema() -> pa.Schema:
 
 def _video(options: ExportOptions, kind: str) -> dict[str, Any]:
     s = options.sensors
-    depth = kind == "depth"
+    depth, channels = kind == "depth", 1 if kind == "depth" else 3
     info: dict[str, Any] = {
         "video.height": s.height, "video.width": s.width, "video.codec": "hevc" if depth else "h264",
-        "video.pix_fmt": "gray12le" if depth else "yuv420p", "video.fps": FPS, "video.channels": 1 if depth else 3,
+        "video.pix_fmt": "gray12le" if depth else "yuv420p", "video.fps": FPS, "video.channels": channels,
         "video.g": KEY_EVERY,
         # The first is LeRobot's name of today, the second that of 0.4 and 0.5.
         "is_depth_map": depth, "video.is_depth_map": depth, "has_audio": False,
@@ -107,8 +102,61 @@ def _video(options: ExportOptions, kind: str) -> dict[str, Any]:
             "video.depth_min": DEPTH_MIN_M, "video.depth_max": s.max_depth_m, "video.shift": DEPTH_SHIFT_M,
             "video.use_log": True, "depth_unit": "m",
         }  # fmt: skip
-    shape = [s.height, s.width, 1 if depth else 3]
-    return {"dtype": "video", "shape": shape, "names": ["height", "width", "channels"], "info": info}
+    names = ["height", "width", "channels"]
+    return {"dtype": "video", "shape": [s.height, s.width, channels], "names": names, "info": info}
+
+
+# Frames are read in any order: every second one is a key frame, as in LeRobot's own videos.
+KEY_EVERY = 2
+QP = 20
+DEPTH_CODES = 4096
+# Metres, of LeRobot's logarithmic steps: code 0 is 0 m, which is "nothing within range" here.
+DEPTH_MIN_M, DEPTH_SHIFT_M = 0.0, 3.5
+_LOW = math.log(DEPTH_MIN_M + DEPTH_SHIFT_M)
+
+_OPTIONS = {
+    # A constant quantiser, and nothing that is decided by floating-point numbers: their sums depend on the processor.
+    "rgb": ("libx264", "yuv420p", {
+        "g": str(KEY_EVERY), "bf": "0", "qp": str(QP), "preset": "veryfast", "flags": "+bitexact+cgop",
+        "x264-params": "aq-mode=0:mbtree=0:weightp=0:rc-lookahead=0:scenecut=0:cpu-independent=1",
+    }),
+    # One thread and no pool: the bytes must not depend on the machine's cores.
+    "depth": ("libx265", "gray12le", {
+        "g": str(KEY_EVERY), "preset": "ultrafast", "flags": "+bitexact+cgop",
+        "x265-params": "lossless=1:bframes=0:pools=none:frame-threads=1:no-info=1:log-level=none",
+    }),
+}  # fmt: skip
+
+
+@contextmanager
+def clip(path: Path, kind: str, width: int, height: int) -> Iterator[Callable[[NDArray[Any]], None]]:
+    """Yield what appends a frame to a video, at even intervals; where the block fails the file stays unfinished."""
+    codec, pixels, options = _OPTIONS[kind]
+    # Without bitexact the muxer writes the library's version into every file.
+    with av.open(str(path), "w", format="mp4", options={"fflags": "+bitexact"}) as container:
+        stream: Any = container.add_stream(codec, rate=Fraction(FPS), options=options)
+        stream.width, stream.height, stream.pix_fmt = width, height, pixels
+        stream.codec_context.thread_count = 1
+
+        def write(frame: NDArray[Any]) -> None:
+            form = "rgb24" if kind == "rgb" else pixels
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(np.ascontiguousarray(frame), format=form)))
+
+        yield write
+        container.mux(stream.encode())
+
+
+def depth_codes(depth_m: NDArray[np.float32], most_m: float) -> NDArray[np.uint16]:
+    """Depth in metres, up to `most_m`, as LeRobot's logarithmic 12-bit codes; the error is at most half a step."""
+    span = math.log(most_m + DEPTH_SHIFT_M) - _LOW
+    scaled = (np.log(depth_m + np.float32(DEPTH_SHIFT_M)) - np.float32(_LOW)) * np.float32((DEPTH_CODES - 1) / span)
+    return np.rint(scaled).clip(0, DEPTH_CODES - 1).astype(np.uint16)
+
+
+def depths_of_codes_m(most_m: float) -> NDArray[np.float64]:
+    """Return the depths that codes stand for, (4096,) float64, metres."""
+    steps = np.arange(DEPTH_CODES) * ((math.log(most_m + DEPTH_SHIFT_M) - _LOW) / (DEPTH_CODES - 1))
+    return np.clip(np.exp(steps + _LOW) - DEPTH_SHIFT_M, DEPTH_MIN_M, most_m)
 
 
 QUANTILES = {"q01": 0.01, "q10": 0.10, "q50": 0.50, "q90": 0.90, "q99": 0.99}
@@ -153,49 +201,43 @@ def frames_a_part(options: ExportOptions) -> int:
 
 def write_part(root: DataRoot, part: Part, options: ExportOptions, folder: Path) -> None:
     """Write the files of a part: its data, its videos, and ``part.json`` with what is counted of them."""
-    labels = Labels(part.index, ())
-    columns: dict[str, list[NDArray[Any]]] = {name: [] for name in frame_schema().names}
+    sums = _no_counts(options)
+    frames: list[dict[str, NDArray[Any]]] = []
     episodes: list[dict[str, Stats]] = []
-    sums: Counts = {}
     with ExitStack() as stack:
         s = options.sensors
         clips = {
-            key: stack.enter_context(Clip(folder / f"{key}.mp4", kind, s.width, s.height, FPS))
+            key: stack.enter_context(clip(folder / f"{key}.mp4", kind, s.width, s.height))
             for key, kind in video_kinds(options).items()
         }
         sample_frames = SampleFrames(root, part, options)
         for k in range(len(part.index)):
-            own = _columns(labels, part, k)
-            counts = _write_videos(sample_frames, k, options, clips, part)
-            stats = {name: row_stats(values) for name, values in own.items()}
-            stats |= {key: _describe_counts(key, found, options, len(own["index"])) for key, found in counts.items()}
-            episodes.append(stats)
-            for name, values in own.items():
-                columns[name].append(values)
+            frames.append(_columns(part, k))
+            counts = _write_videos(sample_frames, k, options, clips)
+            episodes.append({name: row_stats(values) for name, values in frames[-1].items()})
+            episodes[-1] |= _describe_counts(counts, options, int(part.index.steps[k]))
             for key, found in counts.items():
-                _add(sums, key, found)
-    arrays = [_column(field.type, np.concatenate(columns[field.name])) for field in frame_schema()]
-    write_file(folder / "data.parquet", pa.table(arrays, schema=frame_schema()))
+                sums[key] += found
+    columns = {name: list(np.concatenate([of[name] for of in frames])) for name in frame_schema().names}
+    write_file(folder / "data.parquet", pa.table(columns, schema=frame_schema()))
     facts = {"stats": episodes, "counts": {key: found.tolist() for key, found in sums.items()}}
     (folder / _FACTS).write_text(json.dumps(facts), encoding="utf-8")
 
 
-def _column(kind: pa.DataType, values: NDArray[Any]) -> pa.Array:
-    if not pa.types.is_fixed_size_list(kind):
-        return pa.array(values, kind)
-    return pa.FixedSizeListArray.from_arrays(pa.array(values.ravel(), kind.value_type), type=kind)
+def _no_counts(options: ExportOptions) -> Counts:
+    shapes, kinds = {"rgb": (3, 256), "depth": (1, DEPTH_CODES)}, video_kinds(options)
+    keys = [key for view in options.sensors.views for key in (view_key(view), depth_key(view))]
+    return {key: np.zeros(shapes[kinds[key]], np.int64) for key in (*keys, GOAL) if key in kinds}
 
 
-def _columns(labels: Labels, part: Part, k: int) -> dict[str, NDArray[Any]]:
+def _columns(part: Part, k: int) -> dict[str, NDArray[Any]]:
     n = int(part.index.steps[k])
     steps = np.arange(n)
-    found = labels.of(np.array([k]), steps[None], np.ones((1, n), np.bool_))
-    actions = found["action"][0]
-    state = np.column_stack([found["odometry"][0], found["remaining_actions"][0]]).astype(np.float32)
+    found = labels_at(part.index, k, steps)
     return {
-        "observation.state": state,
-        "action": OF_ACTION[actions],
-        "discrete_action": actions,
+        "observation.state": np.column_stack([found["odometry"], found["remaining_actions"]]).astype(np.float32),
+        "action": OF_ACTION[found["action"]],
+        "discrete_action": found["action"],
         "next.done": steps == n - 1,
         "timestamp": (steps / FPS).astype(np.float32),
         "frame_index": steps,
@@ -206,56 +248,46 @@ def _columns(labels: Labels, part: Part, k: int) -> dict[str, NDArray[Any]]:
 
 
 def _write_videos(
-    sample_frames: SampleFrames, k: int, options: ExportOptions, clips: dict[str, Clip], part: Part
+    sample_frames: SampleFrames, k: int, options: ExportOptions, clips: Mapping[str, Callable[[NDArray[Any]], None]]
 ) -> Counts:
     """Write what a trajectory sees into the videos, and count its values."""
     s = options.sensors
-    counts: Counts = {}
+    counts = _no_counts(options)
+
+    def write(key: str, frames: NDArray[Any], times: int = 1) -> None:
+        channels = [frames] if frames.ndim == 3 else np.moveaxis(frames, -1, 0)
+        counts[key] += times * np.stack([_counted(one, counts[key].shape[1]) for one in channels])
+        for frame in frames:
+            for _ in range(times):
+                clips[key](frame)
+
     for _, frames in sample_frames.frames(k):
         for v, view in enumerate(s.views):
             if "rgb" in frames:
-                _add(counts, view_key(view), _rgb_counts(frames["rgb"][:, v]))
-                for picture in frames["rgb"][:, v]:
-                    clips[view_key(view)].write(picture)
+                write(view_key(view), frames["rgb"][:, v])
             if "depth_m" in frames:
-                codes = depth_codes(frames["depth_m"][:, v], s.max_depth_m)
-                _add(counts, depth_key(view), _counted(codes, DEPTH_CODES)[None])
-                for code in codes:
-                    clips[depth_key(view)].write(code)
+                write(depth_key(view), depth_codes(frames["depth_m"][:, v], s.max_depth_m))
     if GOAL in clips:
-        picture = sample_frames.goal(k)
-        n = int(part.index.steps[k])
-        _add(counts, GOAL, _rgb_counts(picture[None]) * n)
-        for _ in range(n):
-            clips[GOAL].write(picture)
+        write(GOAL, sample_frames.goal(k)[None], int(sample_frames.part.index.steps[k]))
     return counts
-
-
-def _add(counts: Counts, key: str, found: NDArray[np.int64]) -> None:
-    counts[key] = counts[key] + found if key in counts else found
-
-
-def _rgb_counts(pictures: NDArray[np.uint8]) -> NDArray[np.int64]:
-    return np.stack([_counted(np.ascontiguousarray(pictures[..., c]), 256) for c in range(3)])
 
 
 def _counted(values: NDArray[Any], n: int) -> NDArray[np.int64]:
     # Counts are 32-bit floats here, exact for as few pixels as are held at a time.
-    found = cv2.calcHist([values.reshape(-1, values.shape[-1])], [0], None, [n], [0, n])
-    return found.ravel().astype(np.int64)
+    rows = np.ascontiguousarray(values).reshape(-1, values.shape[-1])
+    return cv2.calcHist([rows], [0], None, [n], [0, n]).ravel().astype(np.int64)
 
 
-def _describe_counts(key: str, counts: NDArray[np.int64], options: ExportOptions, frames: int) -> Stats:
-    if video_kinds(options)[key] == "depth":
-        return count_stats(counts, depths_of_codes_m(options.sensors.max_depth_m), frames)
-    return count_stats(counts, np.arange(256) / 255.0, frames)
+def _describe_counts(counts: Counts, options: ExportOptions, frames: int) -> dict[str, Stats]:
+    values = {"rgb": np.arange(256) / 255.0, "depth": depths_of_codes_m(options.sensors.max_depth_m)}
+    kinds = video_kinds(options)
+    return {key: count_stats(found, values[kinds[key]], frames) for key, found in counts.items()}
 
 
 def finish(parts: list[Part], options: ExportOptions, made: list[Path], folder: Path) -> dict[str, int]:
     """Put the files of all parts in their places, and write ``meta/``."""
-    keys = list(video_kinds(options))
+    keys, sums = list(video_kinds(options)), _no_counts(options)
     tables: list[pa.Table] = []
-    sums: Counts = {}
     for part, source in zip(parts, made, strict=True):
         at = {"chunk_index": part.number // FILES_A_CHUNK, "file_index": part.number % FILES_A_CHUNK}
         link_or_copy(source / "data.parquet", folder / DATA_PATH.format(**at))
@@ -266,7 +298,7 @@ def finish(parts: list[Part], options: ExportOptions, made: list[Path], folder: 
         path.parent.mkdir(parents=True, exist_ok=True)
         write_file(path, _episodes(part, facts["stats"], keys, at))
         for key, found in facts["counts"].items():
-            _add(sums, key, np.array(found, np.int64))
+            sums[key] += np.array(found, np.int64)
         tables.append(read_file(source / "data.parquet"))
     frames = sum(part.frames for part in parts)
     episodes = sum(len(part.index) for part in parts)
@@ -274,7 +306,7 @@ def finish(parts: list[Part], options: ExportOptions, made: list[Path], folder: 
     write_file(folder / "meta" / "tasks.parquet", _tasks(list(texts.values())))
     every = pa.concat_tables(tables)
     stats = {name: row_stats(_values(every[name])) for name in frame_schema().names}
-    stats |= {key: _describe_counts(key, found, options, frames) for key, found in sums.items()}
+    stats |= _describe_counts(sums, options, frames)
     write_json(folder / "meta" / "stats.json", stats)
     info = {
         "codebase_version": VERSION, "robot_type": "aerialdojo", "total_episodes": episodes, "total_frames": frames,
@@ -322,10 +354,10 @@ def _tasks(texts: list[str]) -> pa.Table:
     """Return the table of tasks, whose text pandas takes for the index, as LeRobot looks them up."""
     numbers = {"name": "task_index", "field_name": "task_index", "pandas_type": "int64", "numpy_type": "int64"}
     words = {"name": "task", "field_name": "task", "pandas_type": "unicode", "numpy_type": "object"}
-    told = {
+    layout = {
         "index_columns": ["task"], "column_indexes": [], "pandas_version": "2.2.0",
         "columns": [{**column, "metadata": None} for column in (numbers, words)],
         "creator": {"library": "pyarrow", "version": pa.__version__},
     }  # fmt: skip
     table = pa.table({"task_index": pa.array(range(len(texts)), pa.int64()), "task": pa.array(texts, pa.string())})
-    return table.replace_schema_metadata({"pandas": json.dumps(told)})
+    return table.replace_schema_metadata({"pandas": json.dumps(layout)})

@@ -11,31 +11,40 @@ from typing import Any
 
 import numpy as np
 
-from aerialdojo_gen.exchange.actions import Move, move, replay, replay_error_m
-from aerialdojo_gen.exchange.fields import BadField, Fields, Floats, rows_of, shown
+from aerialdojo_gen.exchange.frames import Move, move, replay_moves
+from aerialdojo_gen.exchange.records import BadField, Fields, Floats, rows_of, shown
 from aerialdojo_gen.exchange.task import Context, Instance, Route, Task, picture_at
 
-AERIALVLN_MOVES = {
-    0: move("stop"), 1: move("forward 5 m", forward=5), 2: move("turn left 15°", turn_deg=15),
-    3: move("turn right 15°", turn_deg=-15), 4: move("up 2 m", up=2), 5: move("down 2 m", up=-2),
-    6: move("left 5 m", left=5), 7: move("right 5 m", left=-5),
-}  # fmt: skip
+AERIALVLN_MOVES = dict(enumerate(map(move, (
+    "stop", "forward 5 m", "turn left 15°", "turn right 15°", "up 2 m", "down 2 m", "left 5 m", "right 5 m",
+))))  # fmt: skip
+OPENFLY_MOVES = dict(enumerate(map(move, (
+    "stop", "forward 3 m", "turn left 30°", "turn right 30°", "up 3 m", "down 3 m", "left 3 m", "right 3 m",
+    "forward 6 m", "forward 9 m",
+))))  # fmt: skip
+_FULL_TURN = 2 * math.pi + 1e-6
 
 
-def moves_of(numbers: list[int], moves: dict[int, Move]) -> list[Move]:
-    """Look actions up by their numbers; BadField where there is no such action."""
+def moves_of(record: Fields, key: str, moves: dict[int, Move]) -> list[Move]:
+    """Look a record's actions up by number; BadField where there is no such action, or a stop before the end."""
+    numbers = record.whole_numbers(key)
     for k, number in enumerate(numbers):
         if number not in moves:
-            raise BadField(f"actions[{k}]", f"unknown action {number}: known are {', '.join(map(str, moves))}")
-    return [moves[number] for number in numbers]
+            raise BadField(f"{key}[{k}]", f"unknown action {number}: known are {', '.join(map(str, moves))}")
+    found = [moves[number] for number in numbers]
+    if "stop" in (names := [m.name for m in found])[:-1]:
+        raise BadField(f"{key}[{names.index('stop')}]", "stop before the end")
+    return found
+
+
+def without_stop(moves: list[Move]) -> list[Move]:
+    """Actions that lead from pose to pose: all but a stop at the end."""
+    return moves[:-1] if moves[-1].name == "stop" else moves
 
 
 def route_of(moves: list[Move], poses: Floats, context: Context) -> Route:
     """Join actions and poses; where they are not one a pose, the poses stand and the actions keep their own names."""
-    names = [m.name for m in moves]
-    done = moves[:-1] if moves[-1].name == "stop" else moves
-    if "stop" in names[: len(done)]:
-        raise BadField(f"actions[{names.index('stop')}]", "stop before the end")
+    done = without_stop(moves)
     ours, lack = [m.ours for m in done if m.ours is not None], ""
     if len(done) != len(poses) - 1:
         lack = "not one action a pose"
@@ -43,7 +52,8 @@ def route_of(moves: list[Move], poses: Floats, context: Context) -> Route:
         lack = "has actions that are none of ours"
     if lack:
         context.notes[f"{lack}: action is null, source_action has them"] += 1
-    return Route(poses, None if lack else [*ours, 0], names, replay_error_m(done, poses))
+    error_m = float(np.linalg.norm(replay_moves(poses[0], done)[-1, :3] - poses[-1, :3]))
+    return Route(poses, None if lack else [*ours, 0], [m.name for m in moves], error_m)
 
 
 def read_aerialvln(record: Fields, context: Context) -> Task:
@@ -62,40 +72,19 @@ def read_aerialvln(record: Fields, context: Context) -> Task:
         if any(len(row) > 3 for row in rows):
             context.notes["reference_path has attitudes: yaws are taken from start_rotation and the turns"] += 1
         points = context.frame.positions_to_world(record.positions_of([row[:3] for row in rows], "reference_path"))
-        route = _aerialvln_route(record, context, start, points)
+        if record.has("actions"):
+            moves = moves_of(record, "actions", AERIALVLN_MOVES)
+            done = without_stop(moves)
+            fits = len(done) == len(points) - 1
+            yaws = replay_moves(start, done)[:, 3] if fits else np.full(len(points), start[3])
+            route = route_of(moves, np.column_stack([points, yaws]), context)
+        else:
+            context.notes["reference_path without actions, hence without yaws: left aside"] += 1
     if len(goals) > 1:
         context.notes["has several goals: the first is kept"] += 1
     record.has("trajectory_id") and record.name("trajectory_id")
-    return Task(
-        source_id=record.name("episode_id"),
-        scene=record.name("scene_id"),
-        start=start,
-        goal=goal,
-        instances=[Instance("semantic", instruction.text("instruction_text", empty=False))],
-        route=route,
-    )
-
-
-def _aerialvln_route(record: Fields, context: Context, start: Floats, points: Floats) -> Route | None:
-    if not record.has("actions"):
-        context.notes["reference_path without actions, hence without yaws: left aside"] += 1
-        return None
-    moves = moves_of(record.whole_numbers("actions"), AERIALVLN_MOVES)
-    done = moves[:-1] if moves[-1].name == "stop" else moves
-    if len(done) == len(points) - 1:
-        yaws = replay(start, np.array([m.step for m in done], np.float64).reshape(-1, 4))[:, 3]
-    else:
-        yaws = np.full(len(points), start[3])
-    return route_of(moves, np.column_stack([points, yaws]), context)
-
-
-OPENFLY_MOVES = {
-    0: move("stop"), 1: move("forward 3 m", forward=3), 2: move("turn left 30°", turn_deg=30),
-    3: move("turn right 30°", turn_deg=-30), 4: move("up 3 m", up=3), 5: move("down 3 m", up=-3),
-    6: move("left 3 m", left=3), 7: move("right 3 m", left=-3), 8: move("forward 6 m", forward=6),
-    9: move("forward 9 m", forward=9),
-}  # fmt: skip
-_FULL_TURN = 2 * math.pi + 1e-6
+    instances = [Instance("semantic", instruction.text("instruction_text", empty=False))]
+    return Task(record.name("episode_id"), record.name("scene_id"), start, goal, instances, route=route)
 
 
 def read_openfly(record: Fields, context: Context) -> Task:
@@ -109,18 +98,10 @@ def read_openfly(record: Fields, context: Context) -> Task:
         k = int(np.abs(yaws).argmax())
         raise BadField(f"yaw[{k}]", f"{yaws[k]:g} is more than a turn in radians: degrees?")
     poses = np.column_stack([points, context.frame.yaw_to_world(yaws)])
-    try:
-        route = route_of(moves_of(record.whole_numbers("action"), OPENFLY_MOVES), poses, context)
-    except BadField as error:
-        raise BadField(error.field.replace("actions", "action"), error.why) from None
-    return Task(
-        source_id=image_path,
-        scene=image_path.replace("\\", "/").split("/")[0],
-        start=poses[0],
-        goal=points[-1],
-        instances=[Instance("semantic", record.text("gpt_instruction", empty=False))],
-        route=route,
-    )
+    route = route_of(moves_of(record, "action", OPENFLY_MOVES), poses, context)
+    instances = [Instance("semantic", record.text("gpt_instruction", empty=False))]
+    scene = image_path.replace("\\", "/").split("/")[0]
+    return Task(image_path, scene, poses[0], points[-1], instances, route=route)
 
 
 def read_cityavos(record: Fields, context: Context) -> Task:
@@ -135,15 +116,8 @@ def read_cityavos(record: Fields, context: Context) -> Task:
     if context.pictures is not None:
         name = record.text("target_image_path", empty=False)
         instances.append(Instance("image", picture=picture_at(context.pictures, name, "target_image_path")))
-    return Task(
-        source_id=record.name("mission_id"),
-        scene=record.name("scene_id"),
-        start=start,
-        goal=goal,
-        instances=instances,
-        object_key=tuple(goal.tolist()),
-        object_m=goal,
-    )
+    source_id, scene = record.name("mission_id"), record.name("scene_id")
+    return Task(source_id, scene, start, goal, instances, object_key=tuple(goal.tolist()), object_m=goal)
 
 
 def _radians(yaw: float, context: Context) -> float:
@@ -169,22 +143,12 @@ def read_uav_on(record: Fields, context: Context) -> Task:
     if len(places) > 1:
         context.notes["pose has several places of the target: the nearest to the start is the goal"] += 1
     scene, node = record.name("map_name"), record.text("object_name", empty=False)
-    known: dict[str, Any] = {
-        "target_name": record.text("true_name", empty=False),
-        "mesh_node": node,
-        "category": record.optional_text("category"),
-    }
+    known: dict[str, Any] = {"target_name": record.text("true_name", empty=False), "mesh_node": node}
+    known["category"] = record.optional_text("category")
     if record.has("used-in-train"):
         known["subset"] = "train" if record.flag("used-in-train") else "test"
     if record.has("info") and (info := record.child("info")).has("geodesic_distance"):
         known["stated_length_m"] = info.number("geodesic_distance")
-    return Task(
-        source_id=f"{scene}/{record.name('episode_id')}",
-        scene=scene,
-        start=start,
-        goal=nearest,
-        instances=[Instance("semantic", record.optional_text("description"))],
-        object_key=(node, *nearest.tolist()),
-        object_m=nearest,
-        known=known,
-    )
+    instances, key = [Instance("semantic", record.optional_text("description"))], (node, *nearest.tolist())
+    source_id = f"{scene}/{record.name('episode_id')}"
+    return Task(source_id, scene, start, nearest, instances, object_key=key, object_m=nearest, known=known)

@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.base.errors import UsageError
-from aerialdojo_gen.base.names import unknown
+from aerialdojo_gen.base.names import check_known
 from aerialdojo_gen.benchmark.agents.goal import Sensors
 from aerialdojo_gen.benchmark.observations import renderer_name
 from aerialdojo_gen.benchmark.tasks import Selection, mesh_of, reference_image, select
 from aerialdojo_gen.learning.index import Index, read_index
 from aerialdojo_gen.learning.pictures import Frames, RecordedFrames, RenderedFrames, Source
 from aerialdojo_gen.learning.trajectories import SOURCES, recorded_alone
-from aerialdojo_gen.learning.words import goal_text
 from aerialdojo_gen.rendering.sample import choose_trajectories
 from aerialdojo_gen.store.root import DataRoot
 
@@ -51,11 +50,8 @@ class ExportOptions:
             raise UsageError(f"a limit is 0, for all, or more, not {self.limit}")
         object.__setattr__(self, "renderer", "" if self.source == "recordings" else renderer_name(self.renderer))
         object.__setattr__(self, "splits", Selection(self.splits).splits)
-        for name in self.goal:
-            if name not in GOALS:
-                raise UsageError(unknown("no goal", name, GOALS))
-        if self.source not in SOURCES:
-            raise UsageError(unknown("no source", self.source, SOURCES))
+        check_known("no goal", self.goal, GOALS)
+        check_known("no source", [self.source], SOURCES)
         if not self.goal:
             raise UsageError(f"a goal is given by {' or '.join(GOALS)}: name one")
         if not self.sensors.views or not (self.sensors.rgb or self.sensors.depth):
@@ -85,21 +81,19 @@ class Part:
         return self.index.scenes[0]
 
     @property
+    def label(self) -> str:
+        """Name it in messages."""
+        return f"part {self.number} of {self.scene}"
+
+    @property
     def frames(self) -> int:
         """How many steps it has, each seen in every view."""
         return int(self.index.first[-1])
 
     def cut(self, trajectories: int, steps: int) -> Part:
         """Keep the first trajectories, and of each the first steps: a sample to measure."""
-        index = self.index.take(np.arange(min(trajectories, len(self.index))))
-        short = [index.actions_of(k)[:steps] for k in range(len(index))]
-        first = np.concatenate([[0], np.cumsum([len(actions) for actions in short])]).astype(np.int64)
-        small = Index(
-            index.scenes, index.roots, index.scene, index.nav_id, np.concatenate(short), first, index.start,
-            index.goal, index.budget, index.goal_columns,
-        )  # fmt: skip
-        n = len(small)
-        return Part(0, small, self.settings[:n], self.splits[:n], self.tasks[:n], self.texts[:n], 0, 0)
+        few = self.index.take(np.arange(min(trajectories, len(self.index))))
+        return replace(self, index=replace(few, routes=[actions[:steps] for actions in few.routes]))
 
 
 def plan_parts(root: DataRoot, options: ExportOptions, frames_a_part: int) -> list[Part]:
@@ -115,17 +109,15 @@ def plan_parts(root: DataRoot, options: ExportOptions, frames_a_part: int) -> li
             mesh_of(root, scene)  # a scene without a mesh is named before the first picture
     else:
         chosen = recorded_alone(chosen, options.sensors, "--source render")
-    texts = [IMAGE_TASK if modalities else goal_text(*said) for said in zip(
-        *(chosen.goal_columns[name] for name in ("target_name", "landmark", "direction", "description")), strict=True
-    )]  # fmt: skip
+    texts = [IMAGE_TASK] * len(chosen) if modalities else chosen.goal_texts
     number = {text: k for k, text in enumerate(dict.fromkeys(texts))}
     parts: list[Part] = []
     for rows in _cuts(chosen, frames_a_part):
-        own, said = [known[chosen.nav_id[k]] for k in rows], [texts[k] for k in rows]
+        own, goals = [known[chosen.nav_id[k]] for k in rows], [texts[k] for k in rows]
         parts.append(Part(
             len(parts), chosen.take(rows), [row["setting"] for row in own],
             [f"{row['partition'].lower()}_{row['subset']}" for row in own],
-            np.array([number[text] for text in said], np.int64), said, int(rows[0]), int(chosen.first[rows[0]]),
+            np.array([number[text] for text in goals], np.int64), goals, int(rows[0]), int(chosen.first[rows[0]]),
         ))  # fmt: skip
     return parts
 
@@ -133,11 +125,9 @@ def plan_parts(root: DataRoot, options: ExportOptions, frames_a_part: int) -> li
 def _chosen(index: Index, known: dict[str, dict[str, str]], options: ExportOptions) -> NDArray[np.int64]:
     if not options.limit:
         return np.arange(len(index))
-    by_scene: dict[str, list[dict[str, str]]] = {}
-    for nav_id in index.nav_id:
-        by_scene.setdefault(known[nav_id]["scene"], []).append(known[nav_id])
     taken: set[str] = set()
-    for rows in by_scene.values():
+    for scene in index.scenes:
+        rows = [known[nav_id] for nav_id in index.nav_id if known[nav_id]["scene"] == scene]
         taken.update(choose_trajectories(rows, options.limit, options.seed))
     return np.flatnonzero([nav_id in taken for nav_id in index.nav_id])
 
@@ -155,7 +145,7 @@ class SampleFrames:
     """What the trajectories of a part see, and what their goals look like."""
 
     def __init__(self, root: DataRoot, part: Part, options: ExportOptions) -> None:
-        self._root, self._part, self._sensors = root, part, options.sensors
+        self._root, self.part, self._sensors = root, part, options.sensors
         self._source: Source = RenderedFrames(part.index, options.sensors, options.renderer)
         if options.source != "render":
             self._source = RecordedFrames(part.index, options.sensors, self._source)
@@ -163,7 +153,7 @@ class SampleFrames:
     def frames(self, k: int) -> Iterator[tuple[int, Frames]]:
         """Yield the pictures of trajectory k, some steps at a time, with the first of these steps."""
         s = self._sensors
-        n = int(self._part.index.steps[k])
+        n = int(self.part.index.steps[k])
         size = max(1, _PIXELS // (len(s.views) * s.height * s.width))
         for begin in range(0, n, size):
             steps = np.arange(begin, min(begin + size, n))
@@ -172,10 +162,10 @@ class SampleFrames:
     def goal(self, k: int) -> NDArray[np.uint8]:
         """Return trajectory k's goal picture, (H, W, 3) uint8, as large as the views'; black where there is none."""
         s = self._sensors
-        named = self._part.index.goal_columns["reference_image_id"][k]
+        named = self.part.index.goal_columns["reference_image_id"][k]
         if named is None:
             return np.zeros((s.height, s.width, 3), np.uint8)
-        picture = reference_image(self._root, self._part.scene, named)
+        picture = reference_image(self._root, self.part.scene, named)
         shrinks = picture.shape[0] >= s.height and picture.shape[1] >= s.width
         how = cv2.INTER_AREA if shrinks else cv2.INTER_LINEAR
         return np.asarray(cv2.resize(picture, (s.width, s.height), interpolation=how), np.uint8)

@@ -1,26 +1,18 @@
-"""Export the shape of scenes, from their meshes alone: point clouds and occupancy grids, a file a scene."""
+"""The shape of scenes, written from their meshes alone: point clouds and occupancy grids, a file a scene."""
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Sequence
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.base import rng
-from aerialdojo_gen.base.cli_context import command
-from aerialdojo_gen.base.errors import StoreError, UsageError
-from aerialdojo_gen.base.names import choose_scenes, unknown
-from aerialdojo_gen.exchange.folder import MARKER, whole_folder, write_json, write_marker
+from aerialdojo_gen.base.errors import UsageError
+from aerialdojo_gen.exchange.folder import write_json
 from aerialdojo_gen.geometry.soup import soup
-from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.planning.occupancy import Occupancy
 from aerialdojo_gen.scenes.model import Instance, Material, Part, Scene
-from aerialdojo_gen.scenes.stored import read_scene_mesh
-from aerialdojo_gen.store.layout import is_plain
-from aerialdojo_gen.store.root import DataRoot, Where, open_root
 
 # About a gigabyte.
 MAX_POINTS = 50_000_000
@@ -40,13 +32,6 @@ def sample_surface(scene: Scene, points_per_m2: float) -> NDArray[np.void]:
         )
     parts = [_sample(scene, k, points_per_m2) for k in range(len(scene.instances))]
     return np.concatenate([np.empty(0, POINT), *parts])
-
-
-def ply_bytes(points: NDArray[np.void], comment: str) -> bytes:
-    """Encode points, a structured array, as binary little-endian PLY."""
-    fields = [f"property {_PLY[points.dtype[name].str]} {name}" for name in points.dtype.names or ()]
-    head = ["ply", "format binary_little_endian 1.0", f"comment {comment}", f"element vertex {len(points)}", *fields]
-    return "\n".join([*head, "end_header\n"]).encode() + points.tobytes()
 
 
 def _areas(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> NDArray[np.float64]:
@@ -70,14 +55,12 @@ def _sample(scene: Scene, number: int, points_per_m2: float) -> NDArray[np.void]
     across = (np.arange(n) * _GOLDEN + draw.random()) % 1.0
     weights = np.stack([1.0 - along, along * (1.0 - across), along * across], axis=1)
     place = np.einsum("nk,nka->na", weights, instance.vertices[instance.faces[face]])
-    for axis, name in enumerate("xyz"):
-        points[name] = place[:, axis]
+    points["x"], points["y"], points["z"] = place.T
     first = 0
     for part in instance.parts:
         rows = np.flatnonzero((face >= first) & (face < first + len(part.faces)))
         colours = _colours(part, scene.materials[part.material], face[rows] - first, weights[rows])
-        for channel, name in enumerate(("red", "green", "blue")):
-            points[name][rows] = colours[:, channel]
+        points["red"][rows], points["green"][rows], points["blue"][rows] = colours.T
         first += len(part.faces)
     return points
 
@@ -101,69 +84,23 @@ def _colours(
     return found if material.mask is None else np.where(material.mask[row, column, None], found, plain)
 
 
-SHAPES = ("pointcloud", "occupancy")
-POINTS_PER_M2, VOXEL_M = 20.0, 0.5
-_MIN_VOXEL_M, _LARGEST_VOXEL_M = 0.05, 5.0
 # A cell takes up to some 25 bytes while they are computed.
 _MAX_CELLS = 100_000_000
 
 
-def export_shapes(
-    format_name: str,
-    data: Where,
-    out: Path,
-    scenes: Sequence[str] | None = None,
-    *,
-    points_per_m2: float = POINTS_PER_M2,
-    voxel_m: float = VOXEL_M,
-    force: bool = False,
-    reporter: Reporter | None = None,
-) -> dict[str, int]:
-    """Write a point cloud or an occupancy grid of each scene with a mesh; no release is needed."""
-    if format_name not in SHAPES:
-        raise UsageError(unknown("no format", format_name, SHAPES))
-    if not points_per_m2 > 0.0 or not np.isfinite(points_per_m2):
-        raise UsageError(f"--points-per-m2 is above 0, not {points_per_m2:g}")
-    if not _MIN_VOXEL_M <= voxel_m <= _LARGEST_VOXEL_M:
-        raise UsageError(f"--voxel-m is {_MIN_VOXEL_M:g} to {_LARGEST_VOXEL_M:g} metres, not {voxel_m:g}")
-    root = open_root(data)
-    chosen = choose_scenes(scenes, _scenes_with_mesh(root))
-    counts: Counter[str] = Counter(scenes=len(chosen))
-    reporter = reporter or Reporter(quiet=True)
-    meshes = {name: root.digest(f"meshes/{name}.glb") for name in chosen}
-    with whole_folder(out, MARKER, force=force) as folder, reporter.bar("export", len(chosen), "scenes") as bar:
-        for name, sha256 in meshes.items():
-            scene = read_scene_mesh(root, f"meshes/{name}.glb", sha256)
-            if format_name == "pointcloud":
-                counts.update(_write_points(scene, folder / name, points_per_m2))
-            else:
-                counts.update(_write_occupancy(scene, folder / name, voxel_m))
-            bar.advance()
-        own = {"points_per_m2": points_per_m2} if format_name == "pointcloud" else {"voxel_m": voxel_m}
-        frame = "east, north, up, metres"
-        write_marker(folder, format_name, frame, **own, scenes=chosen, mesh_sha256=meshes, counts=counts)
-    return dict(counts)
-
-
-def _scenes_with_mesh(root: DataRoot) -> list[str]:
-    names = sorted(filter(is_plain, (PurePosixPath(path).stem for path in root.list("meshes", "*.glb"))))
-    if not names:
-        raise StoreError(
-            f"there is no mesh in {root.at('meshes')}: name another folder with --data, or make meshes with "
-            f"{command('build-scenes')}"
-        )
-    return names
-
-
-def _write_points(scene: Scene, stem: Path, points_per_m2: float) -> dict[str, int]:
+def write_points(scene: Scene, stem: Path, points_per_m2: float) -> dict[str, int]:
+    """Write a scene's point cloud, and the nodes that its instances are."""
     points = sample_surface(scene, points_per_m2)
     about = f"{scene.name}: x east, y north, z up, metres; instance k is node k - 1 of the mesh"
-    stem.with_name(f"{stem.name}.ply").write_bytes(ply_bytes(points, about))
+    fields = [f"property {_PLY[POINT[name].str]} {name}" for name in POINT.names or ()]
+    head = ["ply", "format binary_little_endian 1.0", f"comment {about}", f"element vertex {len(points)}", *fields]
+    stem.with_name(f"{stem.name}.ply").write_bytes("\n".join([*head, "end_header\n"]).encode() + points.tobytes())
     write_json(stem.with_name(f"{stem.name}.nodes.json"), {"nodes": [one.node for one in scene.instances]})
     return {"points": len(points)}
 
 
-def _write_occupancy(scene: Scene, stem: Path, voxel_m: float) -> dict[str, int]:
+def write_occupancy(scene: Scene, stem: Path, voxel_m: float) -> dict[str, int]:
+    """Write a scene's occupancy grid."""
     cells = int(np.prod(np.ceil((scene.bounds[1] - scene.bounds[0]) / voxel_m)))
     if cells > _MAX_CELLS:
         raise UsageError(f"{scene.name}: {cells:,} voxels are more than {_MAX_CELLS:,}: choose a larger --voxel-m")

@@ -8,15 +8,14 @@ import tarfile
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.base.errors import RenderError, StoreError, brief
-from aerialdojo_gen.base.pictures import FRAME_PNG, encode_png
+from aerialdojo_gen.base.errors import StoreError, brief
+from aerialdojo_gen.base.pictures import FRAME_PNG, encode_jpeg, encode_png
 from aerialdojo_gen.exchange.folder import link_or_copy, write_json
 from aerialdojo_gen.exchange.samples import ExportOptions, Part, SampleFrames
-from aerialdojo_gen.learning.labels import Labels
+from aerialdojo_gen.learning.labels import labels_at
 from aerialdojo_gen.rendering.codecs import to_stored
 from aerialdojo_gen.store.layout import is_plain
 from aerialdojo_gen.store.root import DataRoot
@@ -35,7 +34,8 @@ def frames_a_part(options: ExportOptions) -> int:
 
 def write_part(root: DataRoot, part: Part, options: ExportOptions, folder: Path) -> None:
     """Write the shard of a part."""
-    labels, sample_frames = Labels(part.index, ()), SampleFrames(root, part, options)
+    sample_frames = SampleFrames(root, part, options)
+    kind = "jpg" if options.jpeg_quality else "png"
     # The oldest form of the three has neither times of a finer kind nor names of users: the same bytes everywhere.
     with tarfile.open(folder / _FILE, "w", format=tarfile.USTAR_FORMAT) as tar:
         for k in range(len(part.index)):
@@ -44,57 +44,45 @@ def write_part(root: DataRoot, part: Part, options: ExportOptions, folder: Path)
                 raise StoreError(
                     f"routes of {part.scene} in {root}: nav_id {brief(repr(name), 60)} cannot name a file"
                 )
-            rows = _to_json(labels, part, k, options)
+            rows = _to_json(part, k, options)
             goal = _picture(sample_frames.goal(k), options) if "image" in options.goal else None
             for begin, frames in sample_frames.frames(k):
                 for i in range(len(next(iter(frames.values())))):
                     step = rows[begin + i]
                     key = f"{step['nav_id']}-{step['step']:04d}"
-                    seen = {name: dict(zip(options.sensors.views, of[i], strict=True)) for name, of in frames.items()}
-                    for view, rgb in seen.get("rgb", {}).items():
-                        _add(tar, f"{key}.{view}.{_kind(options)}", _picture(rgb, options))
-                    if "depth_m" in seen:
-                        stored = {view: to_stored(depth_m) for view, depth_m in seen["depth_m"].items()}
-                        _add(tar, f"{key}.depth.npz", _arrays(stored))
+                    images = {
+                        name: dict(zip(options.sensors.views, of[i], strict=True)) for name, of in frames.items()
+                    }
+                    for view, rgb in images.get("rgb", {}).items():
+                        _add(tar, f"{key}.{view}.{kind}", _picture(rgb, options))
+                    if "depth_m" in images:
+                        file = io.BytesIO()
+                        stored = {view: to_stored(depth_m) for view, depth_m in images["depth_m"].items()}
+                        np.savez_compressed(file, **stored)  # type: ignore[arg-type]
+                        _add(tar, f"{key}.depth.npz", file.getvalue())
                     if goal is not None:
-                        _add(tar, f"{key}.goal.{_kind(options)}", goal)
+                        _add(tar, f"{key}.goal.{kind}", goal)
                     _add(tar, f"{key}.json", json.dumps(step, ensure_ascii=False).encode())
 
 
-def _to_json(labels: Labels, part: Part, k: int, options: ExportOptions) -> list[dict[str, Any]]:
+def _to_json(part: Part, k: int, options: ExportOptions) -> list[dict[str, Any]]:
     """Return the JSON of every step of a trajectory."""
     index = part.index
     n = int(index.steps[k])
-    found = labels.of(np.array([k]), np.arange(n)[None], np.ones((1, n), np.bool_))
+    found = labels_at(index, k, np.arange(n))
     whole: dict[str, Any] = {
         "nav_id": index.nav_id[k], "scene": part.scene, "split": part.splits[k], "setting": part.settings[k],
         "n_steps": n, "task": part.texts[k],
     }  # fmt: skip
-    told = ["target_name", "landmark", "direction", "description"] if "text" in options.goal else []
-    told += ["reference_image_id", "image_distance_m"] if "image" in options.goal else []
-    whole |= {name: index.goal_columns[name][k] for name in told}
-    names = ("action", "previous_action", "remaining_actions", "odometry")
-    columns = zip(*(found[name][0].tolist() for name in names), strict=True)
-    return [{**whole, "step": step, **dict(zip(names, of, strict=True))} for step, of in enumerate(columns)]
-
-
-def _kind(options: ExportOptions) -> str:
-    return "jpg" if options.jpeg_quality else "png"
+    hints = ["target_name", "landmark", "direction", "description"] if "text" in options.goal else []
+    hints += ["reference_image_id", "image_distance_m"] if "image" in options.goal else []
+    whole |= {name: index.goal_columns[name][k] for name in hints}
+    rows = zip(*(values.tolist() for values in found.values()), strict=True)
+    return [{**whole, "step": step, **dict(zip(found, row, strict=True))} for step, row in enumerate(rows)]
 
 
 def _picture(rgb: NDArray[np.uint8], options: ExportOptions) -> bytes:
-    if not options.jpeg_quality:
-        return encode_png(rgb, FRAME_PNG)
-    done, data = cv2.imencode(".jpg", rgb[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, options.jpeg_quality])
-    if not done:
-        raise RenderError(f"OpenCV could not compress a picture of {rgb.shape[1]} x {rgb.shape[0]} pixels")
-    return bytes(data)
-
-
-def _arrays(arrays: dict[str, NDArray[np.uint16]]) -> bytes:
-    file = io.BytesIO()
-    np.savez_compressed(file, **arrays)  # type: ignore[arg-type]
-    return file.getvalue()
+    return encode_jpeg(rgb, options.jpeg_quality) if options.jpeg_quality else encode_png(rgb, FRAME_PNG)
 
 
 def _add(tar: tarfile.TarFile, name: str, content: bytes) -> None:

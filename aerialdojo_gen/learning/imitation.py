@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.base import rng
-from aerialdojo_gen.learning.exploration_views import NOTHING
 from aerialdojo_gen.learning.loader import torch_package
-from aerialdojo_gen.learning.localization import UNIT_M, LocalizationOutput, offset_loss, pose_loss
-from aerialdojo_gen.learning.network import Network, PolicyOutput
+from aerialdojo_gen.learning.network import UNIT_M, LocalizationOutput, Network, PolicyOutput, offset_loss, pose_loss
+from aerialdojo_gen.learning.parts import NOTHING
 from aerialdojo_gen.learning.recipe import Recipe
 from aerialdojo_gen.learning.steps import Pool
 from aerialdojo_gen.learning.words import word_targets
@@ -44,12 +43,14 @@ class Progress:
 Assessment = dict[str, float | None]
 
 
-@dataclass(frozen=True)
-class TrainingLog:
+class TrainingLog(Protocol):
     """Receives a training's progress; loss and accuracy are of choices given the goal's place."""
 
-    on_batch: Callable[[int, int, float, float], None]  # Batches done and in all, loss, accuracy
-    on_epoch: Callable[[dict[str, Any], float], None]  # The epoch's line of the history, and seconds left
+    def on_batch(self, done: int, total: int, loss: float, accuracy: float) -> None:
+        """After so many batches of all."""
+
+    def on_epoch(self, row: dict[str, Any], epochs: int, left_s: float) -> None:
+        """After an epoch: its line of the history, how many epochs there are, and seconds left."""
 
 
 def epoch_batches(
@@ -79,11 +80,11 @@ def blocked_loss(logits: Any, blocked: Any) -> Any:
 class Learner:
     """A network, the moments of its gradients, and what it learns by."""
 
-    def __init__(self, network: Network, recipe: Recipe, device: str) -> None:
+    def __init__(self, network: Network, recipe: Recipe, device: str, phase: int) -> None:
         self.torch = torch_package()
         self.network = network.to(device)
         self.recipe, self.device = recipe, device
-        self.begin(0)
+        self.begin(phase)
         # Steps of the pool that are not kept back.
         self._about: list[tuple[Pool, Any, NDArray[np.int64]]] = []
 
@@ -157,21 +158,21 @@ class Learner:
             return epoch_batches(lengths, self.recipe.train.batch_steps, self.recipe.seed, self.progress.phase, epoch)
 
         self.run_epochs(
-            [len(batches(epoch)) for epoch in range(epochs)], batches, learning_rate, log,
+            epochs, batches, learning_rate, log,
             step=lambda episodes, rate: self._step(pool, frames, episodes, rate),
             assess=lambda: self.assess(pool, frames, held_out),
         )  # fmt: skip
 
     def run_epochs(
-        self, counts: Sequence[int], batches: Callable[[int], list[NDArray[np.int64]]], learning_rate: float,
+        self, epochs: int, batches: Callable[[int], list[NDArray[np.int64]]], learning_rate: float,
         log: TrainingLog, *, step: Callable[[NDArray[np.int64], float], tuple[float, float, int]],
         assess: Callable[[], Assessment | None] = lambda: None,
     ) -> None:  # fmt: skip
         """Go on through epochs; `step` learns a batch, and returns its mean loss, how many are right, of how many."""
-        p = self.progress
+        p, counts = self.progress, [len(batches(epoch)) for epoch in range(epochs)]
         total, done = sum(counts), sum(counts[: p.epoch]) + p.batch
         started, first = time.monotonic(), done
-        while p.epoch < len(counts):
+        while p.epoch < epochs:
             self.network.train()
             for batch in batches(p.epoch)[p.batch :]:
                 loss, right, n = step(batch, self.rate(done, total, learning_rate))
@@ -182,7 +183,7 @@ class Learner:
             mean_loss, accuracy = (value / max(p.sums[2], 1.0) for value in p.sums[:2])
             row: dict[str, Any] = {"phase": p.phase, "epoch": p.epoch, "loss": mean_loss, "accuracy": accuracy}
             p.epoch, p.batch, p.sums = p.epoch + 1, 0, [0.0, 0.0, 0.0]
-            log.on_epoch(row | {"kept_back": assess()}, left_s)
+            log.on_epoch(row | {"kept_back": assess()}, epochs, left_s)
 
     def assess(self, pool: Pool, frames: Any, chosen: NDArray[np.bool_]) -> Assessment | None:
         """See how well the network does on some episodes; None without any."""
@@ -194,19 +195,19 @@ class Learner:
         with self.torch.no_grad():
             for episodes in epoch_batches(lengths, self.recipe.train.batch_steps, 0, 0, 0):
                 batch = self._batch(pool, frames, episodes, rng.generator(0, "kept back"))
-                (thought, estimate), mask = self._forward(batch, teacher_forced=False), batch["mask"]
-                right.append((thought.logits.argmax(-1) == batch["label"])[mask])
-                said, is_so = thought.blocked[mask] > 0.0, batch["blocked"][mask]
-                blocked_at.append(said[is_so])
-                free.append(~said[~is_so])
+                (output, estimate), mask = self._forward(batch, teacher_forced=False), batch["mask"]
+                right.append((output.logits.argmax(-1) == batch["label"])[mask])
+                predicted, is_so = output.blocked[mask] > 0.0, batch["blocked"][mask]
+                blocked_at.append(predicted[is_so])
+                free.append(~predicted[~is_so])
                 away = self.torch.linalg.vector_norm(estimate.offset * UNIT_M - batch["offset"], dim=-1)
                 off.append(away[mask])
                 first.append(away[:, 0])
         median = [float(self.torch.cat(one).median()) for one in (off, first)]
-        rates = [self.torch.cat(one).float() for one in (blocked_at, free)]
-        shares = [float(one.mean()) if len(one) else None for one in rates]
+        rates = [self.torch.cat(one).float() for one in (right, blocked_at, free)]
+        accuracy, *shares = (float(one.mean()) if len(one) else None for one in rates)
         names = ("accuracy", "goal_off_m", "goal_off_at_start_m", "blocked_told", "free_told")
-        return dict(zip(names, (float(self.torch.cat(right).float().mean()), *median, *shares), strict=True))
+        return dict(zip(names, (accuracy, *median, *shares), strict=True))
 
     def rate(self, done: int, total: int, highest: float) -> float:
         """Learning rate after so many of all batches of a phase."""
@@ -283,10 +284,10 @@ class Learner:
         batch = self._batch(pool, frames, episodes, draw)
         # What is dropped out is drawn anew at every batch, so that a resumed training draws the same.
         self.torch.manual_seed(int(draw.integers(2**31)))
-        (thought, estimate), mask = self._forward(batch, teacher_forced=True), batch["mask"]
-        logits, label = thought.logits[mask].float(), batch["label"][mask]
+        (output, estimate), mask = self._forward(batch, teacher_forced=True), batch["mask"]
+        logits, label = output.logits[mask].float(), batch["label"][mask]
         loss = functional.cross_entropy(logits, label)
-        touches = blocked_loss(thought.blocked[mask], batch["blocked"][mask])
+        touches = blocked_loss(output.blocked[mask], batch["blocked"][mask])
         where = offset_loss(estimate, batch) + touches + self._views_loss(draw)
         self.update(loss + self.recipe.train.goal_weight * where, rate)
         right = (logits.argmax(-1) == label).sum()
@@ -301,7 +302,9 @@ def train_patch_classifier(learner: Learner, exploration: Pool, words: tuple[str
     """Go through the epochs of a network's sight, from where the progress is."""
     torch, recipe, progress = learner.torch, learner.recipe, learner.progress
     learner.share_cores()
-    chances = _word_targets(exploration.names, words)
+    # Chances of words by object, (objects + 1, words + 1); the last row and the last word are of no object.
+    chances = np.pad(word_targets(exploration.names, words), ((0, 1), (0, 1)))
+    chances[-1, -1] = 1.0
     size = recipe.sight.batch_looks
 
     def batches(epoch: int) -> list[NDArray[np.int64]]:
@@ -310,37 +313,20 @@ def train_patch_classifier(learner: Learner, exploration: Pool, words: tuple[str
 
     def step(rows: NDArray[np.int64], rate: float) -> tuple[float, float, int]:
         draw = rng.generator(recipe.seed, "sight patches", progress.epoch, progress.batch)
-        keep, wanted = _select_patches(exploration.shown(rows), chances, draw)
+        # Patches to learn from. An object of whose name no word is known teaches nothing.
+        shown = exploration.shown(rows).ravel()
+        named = (shown >= 0) & (chances.sum(axis=1)[shown] > 0.0)
+        keep = np.flatnonzero(named | ((shown == NOTHING) & (draw.random(len(shown)) < _EMPTY)))
         if not len(keep):
             return 0.0, 0.0, 0
-        pictures = torch.from_numpy(exploration.frames(rows)).to(learner.device)
-        target = torch.from_numpy(wanted).to(learner.device)
+        wanted = chances[np.where(shown[keep] == NOTHING, len(chances) - 1, shown[keep])]
+        arrays = (exploration.frames(rows), keep, wanted)
+        pictures, kept, target = (torch.from_numpy(array).to(learner.device) for array in arrays)
         with learner.autocast():
-            kept = torch.from_numpy(keep).to(learner.device)
             logits = learner.network.sight(pictures.flatten(0, 1), kept).float()
         cost = torch.nn.functional.cross_entropy(logits, target)
         learner.update(cost, rate)
         right = (target.gather(1, logits.argmax(1, keepdim=True)) > 0).sum()
         return float(cost.detach()), float(right), len(keep)
 
-    count = -(-exploration.n_steps // size)
-    learner.run_epochs([count] * recipe.sight.epochs, batches, recipe.sight.learning_rate, log, step=step)
-
-
-def _word_targets(names: list[str], words: tuple[str, ...]) -> NDArray[np.float32]:
-    """Chances of words by object, (objects + 1, words + 1); the last row and the last word are of no object."""
-    out = np.zeros((len(names) + 1, len(words) + 1), np.float32)
-    out[:-1, :-1] = word_targets(names, words)
-    out[-1, -1] = 1.0
-    return out
-
-
-def _select_patches(
-    shown: NDArray[np.int64], chances: NDArray[np.float32], draw: np.random.Generator
-) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
-    """Choose patches to learn from: their numbers, and the chances of their words."""
-    flat = shown.ravel()
-    # An object of whose name no word is known teaches nothing.
-    named = (flat >= 0) & (chances.sum(axis=1)[flat] > 0.0)
-    keep = np.flatnonzero(named | ((flat == NOTHING) & (draw.random(len(flat)) < _EMPTY)))
-    return keep, chances[np.where(flat[keep] == NOTHING, len(chances) - 1, flat[keep])]
+    learner.run_epochs(recipe.sight.epochs, batches, recipe.sight.learning_rate, log, step=step)

@@ -1,4 +1,4 @@
-"""Which trajectories are learned from: the release's tables as few flat arrays, some MB for all routes."""
+"""Which trajectories are learned from: the release's tables in memory, some MB for all routes."""
 
 from __future__ import annotations
 
@@ -36,44 +36,57 @@ _BY_MODALITY = ("description", "reference_image_id", "image_distance_m")
 class Index:
     """The trajectories of a selection, sorted by scene and navigation task."""
 
-    scenes: tuple[str, ...]  # Their scenes, sorted
-    roots: tuple[DataRoot, ...]  # Of every scene, the data directory that it is in
-    scene: NDArray[np.int32]  # (n,) int32; of every trajectory, an index of `scenes`
+    sources: list[tuple[DataRoot, str]]  # Of every trajectory, its data directory and its scene
     nav_id: list[str]
-    actions: NDArray[np.int8]  # (m,) int8; of all trajectories one after the other: 0 to 15, the last of each a Stop
-    first: NDArray[np.int64]  # (n + 1,) int64; where each trajectory's begin
+    routes: list[NDArray[np.int8]]  # Of every trajectory, its actions: 0 to 15, the last of each a Stop
     start: NDArray[np.float64]  # (n, 4) float64; start poses: x, y, z in metres and yaw in radians, world frame
     goal: NDArray[np.float64]  # (n, 3) float64; goal anchors, metres, world frame
     budget: NDArray[np.int32]  # (n,) int32; most actions, Stop included
     goal_columns: dict[str, list[Any]]  # What each goal says, by column of `tasks`
 
     def __len__(self) -> int:
-        """Return the number of trajectories."""
         return len(self.nav_id)
 
+    @cached_property
+    def roots(self) -> dict[str, DataRoot]:
+        """The scenes, sorted, and the data directory that each is in."""
+        return dict(sorted((scene, root) for root, scene in set(self.sources)))
+
     @property
+    def scenes(self) -> tuple[str, ...]:
+        """The scenes, sorted."""
+        return tuple(self.roots)
+
+    @cached_property
+    def scene(self) -> NDArray[np.int32]:
+        """Of every trajectory, an index of `scenes`, (n,) int32."""
+        number = {name: i for i, name in enumerate(self.roots)}
+        return np.array([number[name] for _, name in self.sources], np.int32)
+
+    @cached_property
+    def actions(self) -> NDArray[np.int8]:
+        """Actions of all trajectories one after the other, (m,) int8."""
+        return np.concatenate([*self.routes, np.empty(0, np.int8)])
+
+    @cached_property
+    def first(self) -> NDArray[np.int64]:
+        """Where each trajectory's actions begin, (n + 1,) int64."""
+        return np.cumsum([0, *map(len, self.routes)], dtype=np.int64)
+
+    @cached_property
     def steps(self) -> NDArray[np.int64]:
         """Actions of every trajectory, Stop included, (n,) int64."""
         return np.diff(self.first)
 
-    def scene_of(self, k: int) -> tuple[DataRoot, str]:
-        """Return the data directory and the scene of trajectory k."""
-        number = self.scene[k]
-        return self.roots[number], self.scenes[number]
-
-    def actions_of(self, k: int) -> NDArray[np.int8]:
-        """Actions of trajectory k, Stop included."""
-        return self.actions[self.first[k] : self.first[k + 1]]
-
     def poses_of(self, k: int) -> NDArray[np.float64]:
         """Poses before every action of trajectory k, (steps, 4) float64, as the environment flies them."""
-        return replay(self.start[k], self.actions_of(k)[:-1])
+        return replay(self.start[k], self.routes[k][:-1])
 
     @property
     def goal_texts(self) -> list[str]:
         """Say each trajectory's goal in words."""
-        said = (self.goal_columns[name] for name in (*_GOAL_WORDS, "description"))
-        return [goal_text(str(name), str(mark), str(way), text) for name, mark, way, text in zip(*said, strict=True)]
+        words = (self.goal_columns[name] for name in (*_GOAL_WORDS, "description"))
+        return [goal_text(*one) for one in zip(*words, strict=True)]
 
     @cached_property
     def digest(self) -> str:
@@ -87,69 +100,64 @@ class Index:
 
     def take(self, rows: NDArray[np.int64]) -> Index:
         """Keep some trajectories, in their order."""
-        pieces = [self.actions_of(int(k)) for k in rows]
-        roots = {self.scenes[i]: self.roots[i] for i in self.scene[rows]}
-        names = sorted(roots)
-        place = {name: i for i, name in enumerate(names)}
+
+        def chosen(values: list[Any]) -> list[Any]:
+            return [values[k] for k in rows]
+
         return Index(
-            tuple(names),
-            tuple(roots[name] for name in names),
-            np.array([place[self.scenes[self.scene[k]]] for k in rows], np.int32),
-            [self.nav_id[k] for k in rows],
-            np.concatenate([*pieces, np.empty(0, np.int8)]),
-            _starts(pieces),
-            self.start[rows], self.goal[rows], self.budget[rows],
-            {name: [texts[k] for k in rows] for name, texts in self.goal_columns.items()},
+            chosen(self.sources), chosen(self.nav_id), chosen(self.routes), self.start[rows], self.goal[rows],
+            self.budget[rows], {name: chosen(texts) for name, texts in self.goal_columns.items()},
         )  # fmt: skip
 
 
 def read_index(
-    root: DataRoot, selection: Selection, target_split: str | None = None, runs: Sequence[str] = (),
-    paraphrase: str = "task",
+    roots: DataRoot | Sequence[DataRoot], selection: Selection, target_split: str | None = None,
+    runs: Sequence[str] = (), paraphrase: str = "task",
 ) -> Index:  # fmt: skip
-    """Read the references of a selection, or the successful flights of runs; paraphrases are drawn by its seed."""
+    """Read the references of a selection, or the successful flights of runs; paraphrases are drawn by its seed.
+
+    Several data directories have different scenes; of each come the tasks that fit, if any.
+    """
     if target_split is not None:
         check_known("no side of the split by objects", [target_split], _SIDES)
-    chosen = select(root, selection)
-    if check_paraphrase(paraphrase) == "random":
-        chosen = _paraphrased(root, chosen, selection.seed)
-    flown = _flown(root, runs) if runs else None
-    if flown is not None:
-        chosen = chosen.filter(pc.is_in(chosen["nav_id"], pa.array(flown, pa.string())))
-        if not chosen.num_rows:
-            raise UsageError(f"no task of the selection has a successful flight in {', '.join(runs)}")
-    parts = []
-    for scene in sorted(pc.unique(chosen["scene"]).to_pylist()):
-        here = chosen.filter(pc.equal(chosen["scene"], scene))
-        parts.append(_scene(root, scene, here, target_split, flown or {}))
-    parts = [part for part in parts if len(part)]
-    if not parts:
-        raise UsageError(f"no task of the selection has the target split {target_split!r}")
-    return _joined(parts)
-
-
-def read_indices(
-    roots: Sequence[DataRoot], selection: Selection, target_split: str | None = None, runs: Sequence[str] = (),
-    paraphrase: str = "task",
-) -> Index:  # fmt: skip
-    """Read the trajectories of several data directories with different scenes, of each the tasks that fit, if any."""
+    check_paraphrase(paraphrase)
     parts: list[Index] = []
     refused: list[UsageError] = []
-    for root in roots:
+    known: dict[str, DataRoot] = {}
+    for root in [roots] if isinstance(roots, DataRoot) else roots:
         try:
-            parts.append(read_index(root, selection, target_split, runs, paraphrase))
+            parts.append(_of_root(root, selection, target_split, runs, paraphrase))
         except UsageError as error:
             refused.append(error)
-    if not parts:
-        raise refused[0] if refused else UsageError("name at least one data directory")
-    known: dict[str, DataRoot] = {}
-    for part in parts:
-        for scene, root in zip(part.scenes, part.roots, strict=True):
+            continue
+        for scene in parts[-1].scenes:
             if scene in known:
                 raise UsageError(f"scene {scene} is in {known[scene]} and in {root}: name one of them")
             known[scene] = root
+    if not parts:
+        raise refused[0] if refused else UsageError("name at least one data directory")
     whole = _joined(parts)
-    return whole.take(np.argsort([whole.scenes[i] for i in whole.scene], kind="stable").astype(np.int64))
+    return whole.take(np.argsort(whole.scene, kind="stable"))
+
+
+def _of_root(
+    root: DataRoot, selection: Selection, target_split: str | None, runs: Sequence[str], paraphrase: str
+) -> Index:
+    chosen = select(root, selection)
+    if paraphrase == "random":
+        chosen = _paraphrased(root, chosen, selection.seed)
+    flown = _flown(root, runs)
+    if runs:
+        chosen = chosen.filter(pc.is_in(chosen["nav_id"], pa.array(flown, pa.string())))
+        if not chosen.num_rows:
+            raise UsageError(f"no task of the selection has a successful flight in {', '.join(runs)}")
+    index = _joined([
+        _scene(root, scene, chosen.filter(pc.equal(chosen["scene"], scene)), target_split, flown)
+        for scene in sorted(pc.unique(chosen["scene"]).to_pylist())
+    ])  # fmt: skip
+    if not len(index):
+        raise UsageError(f"no task of the selection has the target split {target_split!r}")
+    return index
 
 
 def _paraphrased(root: DataRoot, rows: pa.Table, seed: int) -> pa.Table:
@@ -183,11 +191,11 @@ def _flown(root: DataRoot, runs: Sequence[str]) -> dict[str, NDArray[np.int8]]:
 def _scene(
     root: DataRoot, scene: str, rows: pa.Table, target_split: str | None, flown: dict[str, NDArray[np.int8]]
 ) -> Index:
-    tasks: dict[str, dict[str, object]] = {}
-    allowed = None if target_split is None else _of_target_split(root, scene, target_split)
+    if target_split is not None:
+        allowed = pa.array(_of_target_split(root, scene, target_split), pa.string())
+        rows = rows.filter(pc.is_in(rows["nav_id"], allowed))
+    tasks: dict[str, dict[str, Any]] = {}
     for row in rows.to_pylist():
-        if allowed is not None and row["nav_id"] not in allowed:
-            continue
         known = tasks.setdefault(row["nav_id"], row)
         for name in _BY_MODALITY:
             known[name] = row[name] if known[name] is None else known[name]
@@ -198,14 +206,10 @@ def _scene(
     for nav_id in ids:
         if nav_id not in routes:
             raise StoreError(f"task {nav_id} has no route in {root}/release: run {command('split', scene=scene)}")
-    pieces = [flown.get(nav_id, routes[nav_id][0]) for nav_id in ids]
     return Index(
-        (scene,),
-        (root,),
-        np.zeros(len(ids), np.int32),
+        [(root, scene)] * len(ids),
         ids,
-        np.concatenate([*pieces, np.empty(0, np.int8)]),
-        _starts(pieces),
+        [flown.get(nav_id, routes[nav_id][0]) for nav_id in ids],
         np.array([[tasks[i][c] for c in _START] for i in ids], np.float64).reshape(-1, 4),
         np.array([routes[i][1] for i in ids], np.float64).reshape(-1, 3),
         np.array([tasks[i]["action_budget"] for i in ids], np.int32),
@@ -214,7 +218,7 @@ def _scene(
 
 
 def _routes(
-    root: DataRoot, scene: str, side: str, tasks: dict[str, dict[str, object]]
+    root: DataRoot, scene: str, side: str, tasks: dict[str, dict[str, Any]]
 ) -> dict[str, tuple[NDArray[np.int8], list[float]]]:
     columns = ("nav_id", "action", "agent_action", *_GOAL)
     table = store.read_stored(root, f"routes/{side}", scene, columns)
@@ -233,34 +237,25 @@ def _routes(
     return found
 
 
-def _of_target_split(root: DataRoot, scene: str, side: str) -> set[str]:
-    found: set[str] = set()
+def _of_target_split(root: DataRoot, scene: str, side: str) -> list[str]:
+    found: list[str] = []
     for subset in _SIDES:
         table = store.read_stored(root, f"tasks/{subset}", scene, ("nav_id", "target_split"))
         if "target_split" not in table.column_names or table["target_split"].null_count:
             raise UsageError(
                 f"the release in {root} has no split by objects for {scene}: it was made by an older version"
             )
-        found |= set(table.filter(pc.equal(table["target_split"], side))["nav_id"].to_pylist())
+        found += table.filter(pc.equal(table["target_split"], side))["nav_id"].to_pylist()
     return found
 
 
-def _starts(pieces: Sequence[NDArray[np.int8]]) -> NDArray[np.int64]:
-    return np.cumsum([0, *map(len, pieces)], dtype=np.int64)
-
-
 def _joined(parts: Sequence[Index]) -> Index:
-    shifts = _starts([p.actions for p in parts])
-    before = np.cumsum([0, *(len(p.scenes) for p in parts)])
     return Index(
-        tuple(scene for p in parts for scene in p.scenes),
-        tuple(root for p in parts for root in p.roots),
-        np.concatenate([p.scene + np.int32(s) for p, s in zip(parts, before, strict=False)]),
+        [source for p in parts for source in p.sources],
         [nav_id for p in parts for nav_id in p.nav_id],
-        np.concatenate([p.actions for p in parts]),
-        np.concatenate([[0], *(p.first[1:] + s for p, s in zip(parts, shifts, strict=False))]).astype(np.int64),
+        [route for p in parts for route in p.routes],
         np.concatenate([p.start for p in parts]),
         np.concatenate([p.goal for p in parts]),
         np.concatenate([p.budget for p in parts]),
-        {name: [t for p in parts for t in p.goal_columns[name]] for name in parts[0].goal_columns},
+        {name: [text for p in parts for text in p.goal_columns[name]] for name in parts[0].goal_columns},
     )

@@ -1,69 +1,113 @@
-"""Labels of samples, what only teachers and rewards may know, and samples joined to batches."""
+"""Labels of samples, distances along flyable paths, which no agent may know, and samples joined to batches."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from aerialdojo_gen.base.constants import RADIUS_M
 from aerialdojo_gen.benchmark.agents.goal import N_ACTIONS
 from aerialdojo_gen.benchmark.tasks import mesh_of
 from aerialdojo_gen.geometry.frames import wrap_angle_rad
-from aerialdojo_gen.learning.geodesic import geodesic
+from aerialdojo_gen.geometry.motion import DISPLACEMENTS
 from aerialdojo_gen.learning.index import Index
+from aerialdojo_gen.planning.cost_to_go import cost_to_go, costs_at
+from aerialdojo_gen.planning.flight_space import FlightSpace, flight_space
+from aerialdojo_gen.scenes.context import context_of
+
+Floats = NDArray[np.float64]
+
+
+def blocked_actions(space: FlightSpace, poses: ArrayLike) -> tuple[NDArray[np.bool_], NDArray[np.bool_], Floats]:
+    """For poses (n, 4): whether actions collide or are refused, (n, 16) each, and where they lead, (n, 16, 3)."""
+    p = np.asarray(poses, np.float64).reshape(-1, 4)
+    c, s = np.cos(p[:, 3])[:, None], np.sin(p[:, 3])[:, None]
+    ahead, left, up = DISPLACEMENTS[:N_ACTIONS].T
+    ends = np.stack([p[:, :1] + (c * ahead - s * left), p[:, 1:2] + (s * ahead + c * left), p[:, 2:3] + up], axis=2)
+    collides, refused = np.zeros((2, len(p), N_ACTIONS), np.bool_)
+    moves = np.flatnonzero(DISPLACEMENTS[:N_ACTIONS].any(axis=1)).tolist()
+    for k, here in enumerate(map(tuple, p[:, :3].tolist())):
+        for a in moves:
+            collides[k, a], refused[k, a] = space.motion_outcome(here, tuple(ends[k, a].tolist()))
+    ends[refused] = np.broadcast_to(p[:, None, :3], ends.shape)[refused]
+    return collides, refused, ends
+
+
+def blocked_at(space: FlightSpace, poses: ArrayLike) -> NDArray[np.bool_]:
+    """Blocked actions at poses (n, 4): those that collide or are refused, (n, 16) bool."""
+    collides, refused, _ = blocked_actions(space, poses)
+    return collides | refused
+
+
+# Ways longer than this are not found, metres: the longest tasks have routes of 100 m, and who strays flies farther.
+_FARTHEST_M = 200.0
+# How far from the goal a way over the grid may end: what a reference's Approach flies at most, metres.
+_REACH_M = 1.0
+# Fields that a scene keeps, some ten megabytes each.
+_KEPT = 8
+
+
+class Geodesic:
+    """Lengths of shortest ways to the goals of a scene."""
+
+    def __init__(self, space: FlightSpace) -> None:
+        self._space, self._grid = space, space.grid
+        self._field = lru_cache(maxsize=_KEPT)(self._make_field)
+
+    def distances_m(self, goal: ArrayLike, points: ArrayLike) -> Floats:
+        """Shortest way lengths (n,), metres in the action metric, from points (n, 3) to a goal; inf for none."""
+        g, p = np.asarray(goal, np.float64), np.asarray(points, np.float64).reshape(-1, 3)
+        found = np.asarray(costs_at(np.ascontiguousarray(p), self._grid.arrays, self._field(*g.tolist())))
+        return np.maximum(found, np.linalg.norm(p - g, axis=1))
+
+    def actions(self, goal: ArrayLike, poses: ArrayLike) -> tuple[NDArray[np.bool_], NDArray[np.bool_], Floats]:
+        """For poses (n, 4), (n, 16) each: whether actions collide or are refused, and the cost-to-go in metres."""
+        collides, refused, ends = blocked_actions(self._space, poses)
+        cost = self.distances_m(goal, ends.reshape(-1, 3)).reshape(-1, N_ACTIONS)
+        return collides, refused, np.where(collides, np.inf, cost)
+
+    def _make_field(self, *goal: float) -> NDArray[np.float32]:
+        return cost_to_go(np.array([*goal, 0.0]), self._grid, _REACH_M, _FARTHEST_M, _FARTHEST_M + 2 * _REACH_M)
+
+
+def geodesic(mesh: Path, sha256: str, radius_m: float = RADIUS_M) -> Geodesic:
+    """Return a scene's distances, a part of its context; parameters as for `flight_space`."""
+    space = flight_space(mesh, sha256, radius_m)
+    return context_of(space.scene).part("geodesic", lambda: Geodesic(space), radius_m)
+
 
 PRIVILEGED = ("pose", "goal_distance_m", "actions")
 # In the place of the action before the first one.
 NO_ACTION = N_ACTIONS
 
 
-class Labels:
-    """Labels of a selection's trajectories."""
-
-    def __init__(self, index: Index, privileged: tuple[str, ...]) -> None:
-        self.index, self.privileged = index, privileged
-
-    def of(self, rows: NDArray[np.int64], steps: NDArray[np.int64], mask: NDArray[np.bool_]) -> dict[str, Any]:
-        """Labels of windows of steps (n, T), by name; 0 where the mask is false."""
-        index = self.index
-        n, window = steps.shape
-        out: dict[str, Any] = {
-            "action": np.zeros((n, window), np.int64),
-            "previous_action": np.zeros((n, window), np.int64),
-            "remaining_actions": np.zeros((n, window), np.int32),
-            "odometry": np.zeros((n, window, 4), np.float32),
-        }
-        if "pose" in self.privileged:
-            out["pose"] = np.zeros((n, window, 4))
-        if "goal_distance_m" in self.privileged:
-            out["goal_distance_m"] = np.zeros((n, window), np.float32)
-        if "actions" in self.privileged:
-            out["action_collides"], out["action_refused"] = np.zeros((2, n, window, N_ACTIONS), np.bool_)
-            out["action_cost_to_go_m"] = np.zeros((n, window, N_ACTIONS), np.float32)
-        for i, k in enumerate(rows.tolist()):
-            here, at = mask[i], steps[i, mask[i]]
-            actions, poses = index.actions_of(k), index.poses_of(k)
-            out["action"][i, here] = actions[at]
-            out["previous_action"][i, here] = np.concatenate([[NO_ACTION], actions[:-1]])[at]
-            out["remaining_actions"][i, here] = index.budget[k] - at
-            out["odometry"][i, here] = odometry(poses)[at]
-            if "pose" in self.privileged:
-                out["pose"][i, here] = poses[at]
-            if self.privileged and self.privileged != ("pose",):
-                self._known(out, i, here, k, poses[at])
-        return out
-
-    def _known(
-        self, out: dict[str, Any], i: int, here: NDArray[np.bool_], k: int, poses: NDArray[np.float64]
-    ) -> None:  # fmt: skip
-        ways, goal = geodesic(*mesh_of(*self.index.scene_of(k))), self.index.goal[k]
-        if "goal_distance_m" in self.privileged:
-            out["goal_distance_m"][i, here] = ways.distances_m(goal, poses[:, :3])
-        if "actions" in self.privileged:
-            out["action_collides"][i, here], out["action_refused"][i, here], cost = ways.actions(goal, poses)
-            out["action_cost_to_go_m"][i, here] = cost
+def labels_at(
+    index: Index, k: int, steps: NDArray[np.int64], privileged: Sequence[str] = ()
+) -> dict[str, NDArray[Any]]:
+    """Labels of some steps of trajectory k, by name: arrays that lead with the step."""
+    actions, poses = index.routes[k].astype(np.int64), index.poses_of(k)
+    out: dict[str, NDArray[Any]] = {
+        "action": actions[steps],
+        "previous_action": np.concatenate([[NO_ACTION], actions[:-1]])[steps],
+        "remaining_actions": (index.budget[k] - steps).astype(np.int32),
+        "odometry": odometry(poses)[steps].astype(np.float32),
+    }
+    if "pose" in privileged:
+        out["pose"] = poses[steps]
+    if {"goal_distance_m", "actions"} & {*privileged}:
+        geodesics, goal = geodesic(*mesh_of(*index.sources[k])), index.goal[k]
+        if "goal_distance_m" in privileged:
+            out["goal_distance_m"] = geodesics.distances_m(goal, poses[steps, :3]).astype(np.float32)
+        if "actions" in privileged:
+            out["action_collides"], out["action_refused"], cost = geodesics.actions(goal, poses[steps])
+            out["action_cost_to_go_m"] = cost.astype(np.float32)
+    return out
 
 
 def odometry(poses: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -96,17 +140,13 @@ def collate(samples: Sequence[dict[str, Any]]) -> dict[str, Any]:
         Arrays that lead with the sample, and lists of texts.
     """
     window = max(len(sample["mask"]) for sample in samples)
-    out: dict[str, Any] = {}
-    for name, first in samples[0].items():
-        values = [sample[name] for sample in samples]
-        if isinstance(first, str):
-            out[name] = values
-        elif name in WHOLE:
+    out: dict[str, Any] = {name: [sample[name] for sample in samples] for name in samples[0]}
+    for name, values in out.items():
+        if name in WHOLE:
             out[name] = np.stack(values)
-        else:
-            out[name] = np.stack(
-                [np.concatenate([np.zeros((window - len(v), *v.shape[1:]), v.dtype), v]) for v in values]
-            )
+        elif not isinstance(values[0], str):
+            pad = [np.zeros((window - len(v), *v.shape[1:]), v.dtype) for v in values]
+            out[name] = np.stack([*map(np.concatenate, zip(pad, values, strict=True))])
     return out
 
 

@@ -10,17 +10,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from aerialdojo_gen.base import rng
 from aerialdojo_gen.base.config.shared import Embodiment
 from aerialdojo_gen.benchmark.agents.goal import Sensors
+from aerialdojo_gen.benchmark.flight import nodes_of
 from aerialdojo_gen.benchmark.observations import clip_depth, renderer_for
 from aerialdojo_gen.benchmark.tasks import Selection, mesh_of, reference_image
-from aerialdojo_gen.learning.encoding import goal_picture, packed
-from aerialdojo_gen.learning.geodesic import blocked_actions
+from aerialdojo_gen.learning.encoding import PATCH_PX, goal_picture, in_patches, packed
 from aerialdojo_gen.learning.index import Index, read_index
-from aerialdojo_gen.learning.labels import odometry, to_body_frame
+from aerialdojo_gen.learning.labels import blocked_at, odometry, to_body_frame
 from aerialdojo_gen.learning.steps import Steps
 from aerialdojo_gen.learning.words import goal_text
-from aerialdojo_gen.planning.flight_space import flight_space
+from aerialdojo_gen.planning.flight_space import FlightSpace, flight_space
 from aerialdojo_gen.scenes.context import SEVERAL, open_scene
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import DataRoot
@@ -54,15 +55,14 @@ class Part:
     data: DataRoot
     splits: tuple[str, ...]  # Where they are found
     settings: tuple[str, ...]
-    scene: str
-    nav_ids: tuple[str, ...]
-    sensors: Sensors
-    size_px: int  # Edge of the goals' pictures
+    sensors: Sensors  # Whose pictures are square, as are the goals'
     renderer: str
     folder: Path  # Where to; named by what is in it
+    runs: tuple[str, ...] = ()  # Whose flights are followed in place of the references
+    scene: str = ""  # Empty, as are the trajectories, where it stands for what parts have in common
+    nav_ids: tuple[str, ...] = ()
     dagger_round: DaggerRound | None = None  # None for the references
     exploration: Exploration | None = None  # Extra views instead of trajectories
-    runs: tuple[str, ...] = ()  # Whose flights are followed in place of the references
 
     @property
     def label(self) -> str:
@@ -71,8 +71,17 @@ class Part:
         return f"{what} of {self.scene}"
 
     def __len__(self) -> int:
-        """Return the number of trajectories, or of views."""
         return len(self.nav_ids) if self.exploration is None else self.exploration.looks
+
+    @property
+    def image_shape(self) -> tuple[int, int, int]:
+        """Of a picture with its depth, and of a goal's picture."""
+        return self.sensors.height, self.sensors.width, 4
+
+    @property
+    def space(self) -> FlightSpace:
+        """Where the body can be in the scene."""
+        return flight_space(*mesh_of(self.data, self.scene), Embodiment().radius_m)
 
     def index(self) -> Index:
         """Read the trajectories."""
@@ -90,8 +99,8 @@ def references(part: Part) -> Steps:
     return Steps(
         frames=pictures(part, poses), first=index.first, label=index.actions.astype(np.int64),
         odometry=np.concatenate([odometry(own) for own in flown]).astype(np.float32),
-        offset=offsets(poses, goals), pose=poses.astype(np.float32), blocked=blocked_at(part, poses),
-        **goals_of(part, index),
+        offset=to_body_frame(poses, goals).astype(np.float32), pose=poses.astype(np.float32),
+        blocked=blocked_at(part.space, poses), **goals_of(part, index),
     )  # fmt: skip
 
 
@@ -100,7 +109,7 @@ def pictures(
 ) -> NDArray[np.uint8]:
     """Render poses, (n, views, H, W, 4) uint8; hands on which instances they show, with the first of these poses."""
     s = part.sensors
-    out = np.empty((len(poses), len(s.views), part.size_px, part.size_px, 4), np.uint8)
+    out = np.empty((len(poses), len(s.views), *part.image_shape), np.uint8)
     if s.blind:
         return out
     context = open_scene(*mesh_of(part.data, part.scene), SEVERAL)
@@ -116,34 +125,21 @@ def pictures(
     return out
 
 
-def blocked_at(part: Part, poses: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Blocked actions at poses (n, 4): (n, 16) bool."""
-    space = flight_space(*mesh_of(part.data, part.scene), Embodiment().radius_m)
-    collides, refused, _ = blocked_actions(space, poses)
-    return collides | refused
-
-
-def offsets(poses: NDArray[np.float64], goals: NDArray[np.float64]) -> NDArray[np.float32]:
-    """Goals (n, 3) in the frames of bodies (n, 4): ahead, left, up, metres."""
-    return to_body_frame(poses, goals).astype(np.float32)
-
-
 def goals_of(part: Part, index: Index) -> dict[str, Any]:
     """Read each trajectory's goal as text and image: fields of `Steps`."""
     names = [index.goal_columns[name] for name in ("target_name", "landmark", "direction", "description")]
     text = [
-        [goal_text(str(n), str(m), str(d), more) for more in (None, said)]
-        for n, m, d, said in zip(*names, strict=True)
+        [goal_text(name, landmark, direction, more) for more in (None, description)]
+        for name, landmark, direction, description in zip(*names, strict=True)
     ]
     ids = index.goal_columns["reference_image_id"]
-    known = sorted({one for one in ids if one is not None})
-    place = {one: k for k, one in enumerate(known)}
-    shown = [goal_picture(reference_image(part.data, part.scene, one), part.size_px) for one in known]
+    known = sorted({*ids} - {None})
+    shown = [goal_picture(reference_image(part.data, part.scene, one), part.sensors.width) for one in known]
     return {
         "text": np.array(text, np.str_).reshape(len(index), 2),
-        "image": np.array([-1 if one is None else place[one] for one in ids], np.int64),
+        "image": np.array([-1 if one is None else known.index(one) for one in ids], np.int64),
         "semantic": np.array([said is not None for said in names[3]], np.bool_),
-        "images": np.array(shown, np.uint8).reshape(-1, part.size_px, part.size_px, 4),
+        "images": np.array(shown, np.uint8).reshape(-1, *part.image_shape),
         "nav_id": np.array(index.nav_id, np.str_),
         "scene": np.full(len(index), part.scene),
     }
@@ -156,3 +152,75 @@ def goal_poses(part: Part, index: Index) -> NDArray[np.float64]:
         rows = store.read_stored(part.data, f"routes/{side}", part.scene, ("nav_id", "goal_yaw_rad"))
         yaw |= dict(zip(rows["nav_id"].to_pylist(), rows["goal_yaw_rad"].to_pylist(), strict=True))
     return np.column_stack([index.goal, [yaw[nav_id] for nav_id in index.nav_id]])
+
+
+# Largest distance of a view from a reference, metres.
+_MAX_OFFSET_M = 3.0
+# Labels of patches without a named object: nothing nameable, or an object that must not be named.
+NOTHING, UNNAMED = -1, -2
+# Smallest number of a patch's pixels for an object to be its label.
+_MIN_PX = PATCH_PX**2 // 4
+
+
+def collect_views(part: Part, exploration: Exploration) -> Steps:
+    """Render extra views of a part's scene: episodes of one step each, without goals and labels."""
+    index = read_index(part.data, Selection(part.splits, (), (), (part.scene,)), exploration.target_split)
+    draw = rng.generator(exploration.seed, "survey", part.scene, exploration.number)
+    at = np.sort(draw.integers(int(index.steps.sum()), size=exploration.looks))
+    # From references of all settings, moved until an obstacle: what a policy sees that has left the route.
+    trajectory = np.searchsorted(index.first, at, side="right") - 1
+    poses = np.empty((exploration.looks, 4))
+    for k in np.unique(trajectory):
+        rows = trajectory == k
+        poses[rows] = index.poses_of(int(k))[at[rows] - index.first[k]]
+    poses[:, 3] = draw.uniform(-np.pi, np.pi, exploration.looks)
+    # Up to the first obstacle.
+    aside, space = draw.normal(size=(exploration.looks, 3)), part.space
+    aside *= (draw.uniform(0.0, _MAX_OFFSET_M, exploration.looks) / np.linalg.norm(aside, axis=1))[:, None]
+    for pose, there in zip(poses, (poses[:, :3] + aside).tolist(), strict=True):
+        pose[:3], _, _ = space.fly(tuple(pose[:3].tolist()), tuple(there))
+    names, number = _named(part, index)
+    shown = np.empty((len(poses), len(part.sensors.views) * (part.sensors.width // PATCH_PX) ** 2), np.int16)
+
+    def label(first: int, instance: NDArray[np.int32]) -> None:
+        shown[first : first + len(instance)] = [patch_labels(one) for one in number[instance]]
+
+    frames = pictures(part, poses, label)
+    n, none = exploration.looks, np.zeros(exploration.looks, np.int64)
+    return Steps(
+        frames=frames, first=np.arange(n + 1), label=none,
+        odometry=np.zeros((n, 4), np.float32), offset=np.zeros((n, 3), np.float32),
+        pose=poses.astype(np.float32), blocked=blocked_at(space, poses),
+        text=np.full((n, 2), ""), image=none - 1,
+        semantic=np.zeros(n, np.bool_), images=np.zeros((0, *part.image_shape), np.uint8),
+        nav_id=np.full(n, ""), scene=np.full(n, part.scene), shown=shown, names=np.array(names, np.str_),
+    )  # fmt: skip
+
+
+def _named(part: Part, index: Index) -> tuple[list[str], NDArray[np.int16]]:
+    """Targets' names, and each instance's index into them; the last entry stands for no instance."""
+    wanted = dict(zip(index.nav_id, index.goal_columns["target_name"], strict=True))
+    names: dict[int, str] = {}
+    for side in ("train", "test"):
+        rows = store.read_stored(part.data, f"routes/{side}", part.scene, ("nav_id", "target_object_id")).to_pylist()
+        names |= {row["target_object_id"]: str(wanted[row["nav_id"]]) for row in rows if row["nav_id"] in wanted}
+    instances = open_scene(*mesh_of(part.data, part.scene), SEVERAL).scene.instances
+    place = {instance.node: k for k, instance in enumerate(instances)}
+    number = np.full(len(instances) + 1, NOTHING, np.int16)
+    known = sorted(names)
+    for object_id, node in nodes_of(part.data, part.scene).items():
+        number[place[node]] = known.index(object_id) if object_id in names else UNNAMED
+    return [names[object_id] for object_id in known], number
+
+
+def patch_labels(number: NDArray[np.int16]) -> NDArray[np.int16]:
+    """Label patches with the object that most of a quarter of their pixels show: (views, H, W) to (patches,)."""
+    pixels = in_patches(number)
+    out = np.full(len(pixels), NOTHING, np.int16)
+    some = np.flatnonzero((pixels != NOTHING).any(axis=1))
+    own = pixels[some]
+    alike = (own[:, :, None] == own[:, None, :]).sum(axis=2) * (own != NOTHING)
+    most = alike.argmax(axis=1)
+    found = own[np.arange(len(own)), most]
+    out[some] = np.where(alike.max(axis=1, initial=0) >= _MIN_PX, found, UNNAMED)
+    return out

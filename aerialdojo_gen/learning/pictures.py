@@ -9,11 +9,13 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import itertools
 import json
 import os
 import struct
 import zlib
-from collections.abc import Iterator, Sequence
+from collections import defaultdict
+from dataclasses import asdict
 from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any, Protocol
@@ -47,11 +49,10 @@ class CachedFrames:
     """Pictures of a source, kept in a folder of `base`, one for each way to make them, that grows to `most_bytes`."""
 
     def __init__(
-        self, source: Source, index: Index, sensors: Sensors, meshes: dict[str, str], base: Path, most_bytes: int,
-        drawn: dict[str, str],
-    ) -> None:  # fmt: skip
-        self._source, self._index, self._sensors, self._meshes = source, index, sensors, meshes
-        self._base, self._most_bytes, self._drawn = base, most_bytes, drawn
+        self, source: Source, index: Index, sensors: Sensors, base: Path, most_bytes: int, kind: str, renderer: str
+    ) -> None:
+        self._source, self._index, self._sensors = source, index, sensors
+        self._base, self._most_bytes, self._kind, self._renderer = base, most_bytes, kind, renderer
         self._full = False
         self._used: int | None = None
         self._since = 0
@@ -59,12 +60,10 @@ class CachedFrames:
     def frames(self, trajectories: NDArray[np.int64], steps: NDArray[np.int64]) -> Frames:
         """Read what is there, draw the rest, and keep what was drawn while there is room; see `Source`."""
         out = empty_frames(self._sensors, len(steps))
-        missing = []
-        for k in np.unique(trajectories):
+        for k in np.unique(trajectories).tolist():
             rows = np.flatnonzero(trajectories == k)
-            if not self._read(int(k), steps[rows], rows, out):
-                missing.append((int(k), rows))
-        for k, rows in missing:
+            if self._read(k, steps[rows], rows, out):
+                continue
             if not self._full and self._room():
                 n = int(self._index.steps[k])
                 whole = self._source.frames(np.full(n, k), np.arange(n))
@@ -72,8 +71,7 @@ class CachedFrames:
                 drawn = take(whole, steps[rows])
             else:
                 drawn = self._source.frames(trajectories[rows], steps[rows])
-            for name, seen in drawn.items():
-                out[name][rows] = seen
+            put(out, rows, drawn)
         return out
 
     @property
@@ -83,23 +81,18 @@ class CachedFrames:
 
     @cached_property
     def _folder(self) -> Path:
-        s, modules = self._sensors, ("bodies", "gl", "world", "reader")
-        facts = {
-            "code": [code_of(f"aerialdojo_gen.rendering.{name}").digest for name in modules],
-            "source": self._drawn["source"],
-            # In the process that reads: to find out which renderer works here is to draw.
-            "renderer": renderer_name(self._drawn["renderer"]), "views": s.views, "rgb": s.rgb, "depth": s.depth,
-            "width": s.width, "height": s.height, "fov_deg": s.fov_deg, "max_depth_m": s.max_depth_m,
-        }  # fmt: skip
+        code = [code_of(f"aerialdojo_gen.rendering.{name}").digest for name in ("bodies", "gl", "world", "reader")]
+        # In the process that reads: to find out which renderer works here is to draw.
+        facts = [code, self._kind, renderer_name(self._renderer), asdict(self._sensors)]
         folder = self._base / hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()[:16]
         make_folder(folder)
         return folder
 
     def _path(self, k: int) -> Path:
         index = self._index
-        flown = hashlib.sha256(index.start[k].tobytes() + index.actions_of(k).tobytes()).hexdigest()[:16]
-        mesh = self._meshes[index.scenes[index.scene[k]]][:16]
-        return self._folder / mesh / f"{index.nav_id[k]}-{flown}.pix"
+        flown = hashlib.sha256(index.start[k].tobytes() + index.routes[k].tobytes()).hexdigest()[:16]
+        _, mesh_sha256 = mesh_of(*index.sources[k])
+        return self._folder / mesh_sha256[:16] / f"{index.nav_id[k]}-{flown}.pix"
 
     def _read(self, k: int, steps: NDArray[np.int64], rows: NDArray[np.int64], out: Frames) -> bool:
         n = int(self._index.steps[k])
@@ -120,27 +113,23 @@ class CachedFrames:
         return True
 
     def _unpack(self, packed: bytes, row: int, out: Frames) -> None:
-        sizes = {name: seen[row].nbytes for name, seen in out.items()}
-        plain = np.frombuffer(self._codec.decompress(packed, sum(sizes.values())), np.uint8)
-        if "rgb" in out:
-            out["rgb"][row] = plain[: sizes["rgb"]].reshape(out["rgb"][row].shape)
-        if "depth_m" in out:
-            # The bytes of one significance together, which are alike: see `_pack`.
-            planes = np.ascontiguousarray(plain[-sizes["depth_m"] :].reshape(4, -1).T)
-            out["depth_m"][row] = planes.view("<f4").reshape(out["depth_m"][row].shape)
+        rest = np.frombuffer(self._codec.decompress(packed, sum(one[row].nbytes for one in out.values())), np.uint8)
+        for one in out.values():
+            planes, rest = np.split(rest, [one[row].nbytes])
+            values = np.ascontiguousarray(planes.reshape(one.itemsize, -1).T)
+            one[row] = values.view(one.dtype).reshape(one[row].shape)
 
     def _pack(self, frames: Frames, row: int) -> bytes:
-        parts = [frames["rgb"][row].tobytes()] if "rgb" in frames else []
-        if "depth_m" in frames:
-            parts.append(frames["depth_m"][row].astype("<f4").view(np.uint8).reshape(-1, 4).T.tobytes())
-        return bytes(self._codec.compress(b"".join(parts), asbytes=True))
+        # The bytes of one significance together, which are alike.
+        values = (np.ascontiguousarray(one[row]) for one in frames.values())
+        planes = (of.view(np.uint8).reshape(-1, of.itemsize).T.tobytes() for of in values)
+        return bytes(self._codec.compress(b"".join(planes), asbytes=True))
 
     def _write(self, k: int, frames: Frames) -> None:
         packed = [self._pack(frames, row) for row in range(int(self._index.steps[k]))]
         starts = np.cumsum([len(_MAGIC) + len(packed) * _ENTRY.size, *(len(p) for p in packed)])
         head = b"".join(_ENTRY.pack(int(at), len(p), zlib.crc32(p)) for at, p in zip(starts, packed, strict=False))
-        path = self._path(k)
-        size = int(starts[-1])
+        path, size = self._path(k), int(starts[-1])
         if self._used is not None and self._used + size > self._most_bytes:
             self._full = True
             return
@@ -160,18 +149,11 @@ class CachedFrames:
 
     def _room(self) -> bool:
         if self._used is None or self._since > _RECOUNT:
-            self._used, self._since = sum(_sizes(self._folder)), 0
+            self._used, self._since = 0, 0
+            for path in self._folder.glob("*/*.pix"):
+                with contextlib.suppress(OSError):
+                    self._used += path.stat().st_size
         return self._used < self._most_bytes
-
-
-def _sizes(folder: Path) -> Iterator[int]:
-    for path in folder.glob("*/*.pix"):
-        with contextlib.suppress(OSError):
-            yield path.stat().st_size
-
-
-# Recordings that are kept open: a trajectory's steps follow each other within a block.
-_OPEN = 16
 
 
 # What the chosen views show at n poses, of "rgb" and "depth_m" those asked for: (n, views, H, W, 3) uint8, sRGB, and
@@ -184,9 +166,10 @@ def take(frames: Frames, rows: NDArray[np.int64]) -> Frames:
     return {name: seen[rows] for name, seen in frames.items()}
 
 
-def join(parts: Sequence[Frames]) -> Frames:
-    """Join poses, in their order."""
-    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+def put(out: Frames, rows: NDArray[np.int64], frames: Frames) -> None:
+    """Give poses their rows."""
+    for name, images in frames.items():
+        out[name][rows] = images
 
 
 def empty_frames(sensors: Sensors, n: int) -> Frames:
@@ -213,12 +196,12 @@ class RenderedFrames:
     def frames(self, trajectories: NDArray[np.int64], steps: NDArray[np.int64]) -> Frames:
         """Draw; see `Source`."""
         index, sensors = self._index, self._sensors
-        context = open_scene(*mesh_of(*index.scene_of(int(trajectories[0]))), SEVERAL)
+        context = open_scene(*mesh_of(*index.sources[int(trajectories[0])]), SEVERAL)
         poses = {int(k): index.poses_of(int(k)) for k in np.unique(trajectories)}
         at = np.stack([poses[k][s] for k, s in zip(trajectories.tolist(), steps.tolist(), strict=True)])
         rgb, depth_m = renderer_for(context.scene, self._renderer).render_bodies(sensors.camera, at, sensors.views)
-        seen = {"rgb": rgb} if sensors.rgb else {}
-        return seen | ({"depth_m": clip_depth(depth_m, sensors)} if sensors.depth else {})
+        images: Frames = {"rgb": rgb, "depth_m": clip_depth(depth_m, sensors)}
+        return {name: images[name] for name in empty_frames(sensors, 0)}
 
 
 class RecordedFrames:
@@ -231,7 +214,7 @@ class RecordedFrames:
     def has(self, trajectory: int) -> bool:
         """Whether a trajectory has a recording of all that is asked for."""
         index = self._index
-        (root, scene), nav_id = index.scene_of(trajectory), index.nav_id[trajectory]
+        (root, scene), nav_id = index.sources[trajectory], index.nav_id[trajectory]
         if scene not in self._known:
             self._known[scene] = recorded_frames(root, scene, self._sensors)
         # The recording has a frame a pose of the reference; that of an older version may have other actions.
@@ -246,23 +229,19 @@ class RecordedFrames:
         out = empty_frames(self._sensors, len(steps))
         for rows, read in ((order[known[order]], self._read), (order[~known[order]], self._drawn.frames)):
             if len(rows):
-                for name, seen in read(trajectories[rows], steps[rows]).items():
-                    out[name][rows] = seen
+                put(out, rows, read(trajectories[rows], steps[rows]))
         return out
 
     def _read(self, trajectories: NDArray[np.int64], steps: NDArray[np.int64]) -> Frames:
         index, s = self._index, self._sensors
         out = empty_frames(s, len(steps))
+        # Of depth the nearest value, not a mean: between two surfaces there is none.
+        interpolations = {"rgb": cv2.INTER_AREA, "depth_m": cv2.INTER_NEAREST_EXACT}
         for row, (k, step) in enumerate(zip(trajectories.tolist(), steps.tolist(), strict=True)):
-            root, scene = index.scene_of(k)
+            root, scene = index.sources[k]
             recording = _recording(root, f"media/{scene}/{index.nav_id[k]}")
-            for v, view in enumerate(s.views):
-                if s.rgb:
-                    out["rgb"][row, v] = _smaller(recording.rgb[view][step], s, cv2.INTER_AREA)
-                if s.depth:
-                    # The nearest value, not a mean: between two surfaces there is none.
-                    depth_m = recording.depth_m[view][step]
-                    out["depth_m"][row, v] = _smaller(depth_m, s, cv2.INTER_NEAREST_EXACT)
+            for (v, view), name in itertools.product(enumerate(s.views), out):
+                out[name][row, v] = _smaller(getattr(recording, name)[view][step], s, interpolations[name])
         if s.depth:
             clip_depth(out["depth_m"], s)
         return out
@@ -273,22 +252,19 @@ def recorded_frames(root: DataRoot, scene: str, sensors: Sensors) -> dict[str, i
     if not root.list("recordings", f"{scene}/*.parquet"):
         return {}
     columns = ("nav_id", "view", "modality", "sampling", "n_frames", "width", "height", "fov_deg", "ok")
-    rows = store.read_stored(root, "recordings", scene, columns).to_pylist()
-    wanted = {
-        (view, kind) for view in sensors.views for kind, on in (("rgb", sensors.rgb), ("depth", sensors.depth)) if on
-    }
-    seen: dict[str, set[tuple[str, str]]] = {}
-    frames: dict[str, int] = {}
-    for row in rows:
+    kinds = [kind for kind, on in (("rgb", sensors.rgb), ("depth", sensors.depth)) if on]
+    found: dict[str, dict[tuple[str, str], int]] = defaultdict(dict)
+    for row in store.read_stored(root, "recordings", scene, columns).to_pylist():
         # Pixels of another shape would show another field of view.
         fits = row["width"] * sensors.height == row["height"] * sensors.width and row["fov_deg"] == sensors.fov_deg
         if row["ok"] and row["sampling"] == "steps" and fits:
-            seen.setdefault(row["nav_id"], set()).add((row["view"], row["modality"]))
-            frames[row["nav_id"]] = row["n_frames"]
-    return {nav_id: frames[nav_id] for nav_id, kinds in seen.items() if wanted <= kinds}
+            found[row["nav_id"]][row["view"], row["modality"]] = row["n_frames"]
+    wanted = {*itertools.product(sensors.views, kinds)}
+    return {nav_id: [*frames.values()][-1] for nav_id, frames in found.items() if wanted <= frames.keys()}
 
 
-@lru_cache(maxsize=_OPEN)
+# Few are kept open: a trajectory's steps follow each other within a block.
+@lru_cache(maxsize=16)
 def _recording(root: DataRoot, folder: str) -> Recording:
     try:
         recording = read_recording(root.local_copy(folder))

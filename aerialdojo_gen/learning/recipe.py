@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 from pydantic import Field, ValidationError, model_validator
 
@@ -71,9 +71,7 @@ class TrainingConfig(Section):
         1.0, ge=0, description="of the tasks beside the choice: where body and goal are, which actions are blocked"
     )
     looks: int = Field(
-        256,
-        ge=0,
-        description="pictures from anywhere beside a batch: where they are, and what is in the way",
+        256, ge=0, description="pictures from anywhere beside a batch: where they are, and what is in the way"
     )
     checkpoint_s: float = Field(60.0, gt=0, description="seconds between checkpoints")
 
@@ -124,16 +122,11 @@ class Recipe(Section):
     def reduced(self) -> Recipe:
         """Return the recipe that `--small` trains by."""
         s = self.small
-        return self.model_copy(
-            update={
-                "name": f"{self.name}-small",
-                "data": self.data.model_copy(update={"scenes": s.scenes, "limit": s.limit, "size_px": s.size_px}),
-                "train": self.train.model_copy(update={"epochs": s.epochs, "batch_steps": s.batch_steps}),
-                "dagger": self.dagger.model_copy(
-                    update={"rounds": s.rounds, "episodes": s.dagger_episodes, "epochs": s.dagger_epochs}
-                ),
-            }
-        )
+        data = self.data.model_copy(update={"scenes": s.scenes, "limit": s.limit, "size_px": s.size_px})
+        train = self.train.model_copy(update={"epochs": s.epochs, "batch_steps": s.batch_steps})
+        flown = {"rounds": s.rounds, "episodes": s.dagger_episodes, "epochs": s.dagger_epochs}
+        small = {"data": data, "train": train, "dagger": self.dagger.model_copy(update=flown)}
+        return self.model_copy(update={"name": f"{self.name}-small", **small})
 
 
 def recipe_file(given: str | Path) -> Path:
@@ -150,7 +143,7 @@ def recipe_file(given: str | Path) -> Path:
 def load_recipe(file: str | Path) -> Recipe:
     """Read and validate a recipe."""
     path = recipe_file(file)
-    raw: dict[str, Any] = read_toml(path, ConfigError, finite=False)
+    raw = read_toml(path, ConfigError, finite=False)
     try:
         return Recipe.model_validate(raw)
     except ValidationError as error:

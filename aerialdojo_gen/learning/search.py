@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from aerialdojo_gen.benchmark.agents.goal import Sensors
 from aerialdojo_gen.geometry.cameras import view_pose
 from aerialdojo_gen.learning.encoding import PATCH_PX, in_patches
+from aerialdojo_gen.learning.labels import to_body_frame
 
 Floats = NDArray[np.float64]
 
@@ -64,8 +65,8 @@ class Search:
         self._range_m = sensors.max_depth_m
         self._candidates: dict[tuple[int, int, int], _Candidate] = {}
         # The first corner is ahead to one side, the last to the other.
-        angles = [(k + 0.5) * 2.0 * math.pi / _CORNERS for k in range(_CORNERS)]
-        self._ring = [np.array([_RING_M * math.cos(a), _RING_M * math.sin(a), 0.0]) for a in angles]
+        angles = (np.arange(_CORNERS) + 0.5) * 2.0 * math.pi / _CORNERS
+        self._ring = _RING_M * np.column_stack([np.cos(angles), np.sin(angles), np.zeros(_CORNERS)])
         self._corner = self._since = 0
         self._last: _Candidate | None = None
 
@@ -81,9 +82,9 @@ class Search:
         if not rows.any():
             return
         away_m, distance_m = away_m[rows], distance_m[rows]
-        said = self._target_words[self._target_words > 0.0]
+        named = self._target_words[self._target_words > 0.0]
         # How much less likely these words are than if they were all that is seen there.
-        score = log_chances[rows, :-1] @ self._target_words - float(said @ np.log(said))
+        score = log_chances[rows, :-1] @ self._target_words - float(named @ np.log(named))
         before = away_m * (1.0 - _BEFORE_M / np.maximum(distance_m, _BEFORE_M))[:, None]
         weight = 1.0 / (1.0 + distance_m / _CLEAR_M) ** 2
         cells = np.floor(_from_start(away_m, odometry) / _THING_M).astype(int)
@@ -122,10 +123,8 @@ class Search:
 
 def patch_rays(sensors: Sensors) -> Floats:
     """Directions of patches' middles from the body: (views * rows * columns, 3), ahead, left and up, of depth 1 m."""
-    camera = sensors.camera
-    rays = camera.rays()
     rows, columns = sensors.height // PATCH_PX, sensors.width // PATCH_PX
-    middle = rays.reshape(rows, PATCH_PX, columns, PATCH_PX, 3).mean(axis=(1, 3)).reshape(-1, 3)
+    middle = sensors.camera.rays().reshape(rows, PATCH_PX, columns, PATCH_PX, 3).mean(axis=(1, 3)).reshape(-1, 3)
     found = [middle @ view_pose(np.zeros(3), 0.0, view)[:3, :3].T for view in sensors.views]
     return np.concatenate([np.empty((0, 3)), *found])
 
@@ -145,6 +144,4 @@ def _from_start(away_m: Floats, odometry: NDArray[np.float32]) -> Floats:
 
 def _rotate_back(place: Floats, odometry: NDArray[np.float32]) -> NDArray[np.float32]:
     """A place in the frame of the start, (3,), seen from the body."""
-    x, y, z = (place - odometry[:3]).tolist()
-    c, s = math.cos(odometry[3]), math.sin(odometry[3])
-    return np.array([c * x + s * y, c * y - s * x, z], np.float32)
+    return to_body_frame(odometry[None].astype(np.float64), place[None])[0].astype(np.float32)

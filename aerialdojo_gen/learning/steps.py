@@ -39,7 +39,6 @@ class Steps:
     names: NDArray[np.str_] = field(default_factory=lambda: np.zeros(0, "U1"))  # (k,) str; of those objects
 
     def __len__(self) -> int:
-        """Return the number of episodes."""
         return len(self.first) - 1
 
     def write(self, folder: Path) -> None:
@@ -61,11 +60,9 @@ def read_steps(folder: Path) -> Steps:
     try:
         with np.load(folder / _STEPS, allow_pickle=False) as file:
             rest = {one.name: file[one.name] for one in fields(Steps) if one.name != "frames"}
-        with (folder / _FRAMES).open("rb") as file:
-            np.lib.format.read_magic(file)
-            shape, _, _ = np.lib.format.read_array_header_1_0(file)
-        # What is empty cannot be mapped.
-        frames = np.load(folder / _FRAMES, mmap_mode="r" if np.prod(shape) else None, allow_pickle=False)
+        # What is empty, a header of 128 bytes alone, cannot be mapped.
+        empty = (folder / _FRAMES).stat().st_size <= 128
+        frames = np.load(folder / _FRAMES, mmap_mode=None if empty else "r", allow_pickle=False)
         return Steps(frames=frames, **rest)
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise StoreError(f"{folder} is damaged: remove it, the same command makes it again ({error})") from None
@@ -76,15 +73,13 @@ class Pool:
 
     def __init__(self, parts: Sequence[Steps], scenes: Sequence[str], vocabulary: Vocabulary) -> None:
         self.parts = list(parts)
-        self._steps = np.cumsum([0, *(len(p.label) for p in parts)])
-        joined: dict[str, NDArray[Any]] = {}
-        for name in ("label", "odometry", "offset", "pose", "blocked", "semantic", "nav_id"):
-            joined[name] = np.concatenate([getattr(p, name) for p in parts])
-        shifts = np.cumsum([0, *(len(p.images) for p in parts)])
-        joined["image"] = np.concatenate(
-            [np.where(p.image >= 0, p.image + s, -1) for p, s in zip(parts, shifts, strict=False)]
+        self._steps, images, self._names = (
+            np.cumsum([0, *(len(getattr(p, name)) for p in parts)]) for name in ("label", "images", "names")
         )
-        joined["images"] = np.concatenate([p.images for p in parts])
+        joined: dict[str, NDArray[Any]] = {}
+        for name in ("label", "odometry", "offset", "pose", "blocked", "semantic", "nav_id", "images"):
+            joined[name] = np.concatenate([getattr(p, name) for p in parts])
+        joined["image"] = np.concatenate([_shifted(p.image, n) for p, n in zip(parts, images, strict=False)])
         # The cache has words, not their numbers: another vocabulary asks for no other pictures.
         tokens = [vocabulary.encode(text) for part in parts for text in part.text.ravel().tolist()]
         joined["tokens"] = np.array(tokens, np.int64).reshape(-1, 2, vocabulary.length)
@@ -97,7 +92,6 @@ class Pool:
         self._scene_of_step = np.repeat(self._scene, self.lengths)
 
     def __len__(self) -> int:
-        """Return the number of episodes."""
         return len(self.lengths)
 
     @property
@@ -107,12 +101,18 @@ class Pool:
 
     def frames(self, rows: NDArray[np.int64]) -> NDArray[np.uint8]:
         """Read pictures of steps, in their order."""
-        first = self.parts[0].frames
-        out = np.empty((len(rows), *first.shape[1:]), np.uint8)
+        return self._gather("frames", rows, np.uint8)
+
+    def _gather(
+        self, name: str, rows: NDArray[np.int64], kind: type[np.generic], shifts: NDArray[np.int64] | None = None
+    ) -> NDArray[Any]:
+        """Read rows of an array of steps that is too large to be joined."""
+        out = np.empty((len(rows), *getattr(self.parts[0], name).shape[1:]), kind)
         part = np.searchsorted(self._steps, rows, side="right") - 1
         for p in np.unique(part):
             at = np.flatnonzero(part == p)
-            out[at] = self.parts[p].frames[rows[at] - self._steps[p]]
+            values = getattr(self.parts[p], name)[rows[at] - self._steps[p]]
+            out[at] = values if shifts is None else _shifted(values, shifts[p])
         return out
 
     def places(self, rows: NDArray[np.int64]) -> tuple[NDArray[np.float32], NDArray[np.int64], NDArray[np.bool_]]:
@@ -126,14 +126,7 @@ class Pool:
 
     def shown(self, rows: NDArray[np.int64]) -> NDArray[np.int64]:
         """Read which objects the patches of exploration views show: (n, patches), numbers of `names`; see `Steps`."""
-        part = np.searchsorted(self._steps, rows, side="right") - 1
-        shifts = np.cumsum([0, *(len(p.names) for p in self.parts)])
-        found = [
-            np.where(one >= 0, one + shifts[p], one)
-            for p, row in zip(part.tolist(), rows.tolist(), strict=True)
-            for one in [self.parts[p].shown[row - self._steps[p]].astype(np.int64)]
-        ]
-        return np.array(found, np.int64)
+        return self._gather("shown", rows, np.int64, self._names)
 
     def batch(self, episodes: NDArray[np.int64], by_image: NDArray[np.bool_]) -> dict[str, NDArray[Any]]:
         """Put episodes side by side: ``rows`` (m,), (n, T, …) arrays of steps and (n, …) of goals, by name."""
@@ -151,3 +144,8 @@ class Pool:
         out["tokens"] = j["tokens"][episodes, 1 - shown.astype(np.int64)]
         out["images"] = scatter_rows(j["images"][image[shown]], shown)
         return out
+
+
+def _shifted(numbers: NDArray[Any], by: int) -> NDArray[np.int64]:
+    """Numbers of what a part has, counted through all parts; below 0 there is nothing."""
+    return np.where(numbers >= 0, numbers.astype(np.int64) + by, numbers)

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import importlib
 import json
 import shutil
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,13 +23,12 @@ from aerialdojo_gen.base.safe_parse import loads_json, read_json
 from aerialdojo_gen.benchmark.agents.goal import Sensors
 from aerialdojo_gen.benchmark.tasks import Selection
 from aerialdojo_gen.dataset.contents import release_fingerprint
-from aerialdojo_gen.learning import checkpoints
+from aerialdojo_gen.learning import policy
 from aerialdojo_gen.learning.collect import collect, parts_of, view_parts
 from aerialdojo_gen.learning.encoding import actions_fingerprint
 from aerialdojo_gen.learning.index import Index, read_index
 from aerialdojo_gen.learning.loader import torch_package
 from aerialdojo_gen.learning.parts import DaggerRound, Part
-from aerialdojo_gen.learning.policy import InitialWeights, joined, read_initial_weights
 from aerialdojo_gen.learning.recipe import Recipe
 from aerialdojo_gen.learning.steps import Pool, Steps
 from aerialdojo_gen.learning.trajectories import sample_evenly
@@ -39,10 +39,9 @@ from aerialdojo_gen.store.atomic import atomic_file, make_folder
 from aerialdojo_gen.store.files import file_digest
 from aerialdojo_gen.store.root import DataRoot, LocalRoot, Where, open_root
 
-if TYPE_CHECKING:
-    from aerialdojo_gen.learning.imitation import TrainingLog
-
 _SETTINGS, _CHECKPOINT, _HISTORY = "training.json", "checkpoint.safetensors", "history.jsonl"
+# Of what precedes the rounds of DAgger.
+_PHASES = {-1: "sight", 0: "imitation"}
 # Seconds between progress lines.
 _REPORT_EVERY_S = 15.0
 
@@ -124,37 +123,38 @@ def train(
     drawn = Path(cache) if cache is not None else base / "policies" / "cache"
     make_folder(folder)
     with open_root(folder).lock():
-        given = None if init is None else read_initial_weights(init)
+        given = None if init is None else policy.read_initial_weights(init)
         own = _Training(root, recipe, folder, drawn, given, device, workers, renderer, reporter or Reporter(True))
         return own.run(restart)
 
 
 class _Training:
     def __init__(
-        self, root: DataRoot, recipe: Recipe, folder: Path, cache: Path, init: InitialWeights | None, device: str,
-        workers: int | None, renderer: str, reporter: Reporter,
+        self, root: DataRoot, recipe: Recipe, folder: Path, cache: Path, init: policy.InitialWeights | None,
+        device: str, workers: int | None, renderer: str, reporter: Reporter,
     ) -> None:  # fmt: skip
         from aerialdojo_gen.learning.imitation import Learner
         from aerialdojo_gen.learning.network import Network, Shape
 
         torch = torch_package("train")
-        self._root, self._recipe, self._folder, self._cache = root, recipe, folder, cache
-        self._init, self._workers, self._renderer, self._reporter = init, workers, renderer, reporter
+        self._recipe, self._folder, self._init = recipe, folder, init
+        self._workers, self._reporter = workers, reporter
         d, m = recipe.data, recipe.model
-        self._sensors = Sensors(d.views, bool(d.views), bool(d.views), d.size_px, d.size_px)
-        self._selection = (Selection((d.split,)).splits, d.settings)
+        sensors = Sensors(d.views, bool(d.views), bool(d.views), d.size_px, d.size_px)
+        # What all parts of the training data have in common.
+        self._common = Part(root, Selection((d.split,)).splits, d.settings, sensors, renderer, cache, d.runs)
         self._index, named = self._read_index()
         vocabulary, scenes, words = Vocabulary.of(self._index.goal_texts), self._index.scenes, named
         if init is not None:
-            init.check_fit(self._sensors, m)
+            init.check_fit(sensors, m)
             vocabulary = init.vocabulary(vocabulary)
-            scenes, words = joined(init.about.scenes, scenes), joined(init.about.named, named)
+            scenes, words = policy.joined(init.about.scenes, scenes), policy.joined(init.about.named, named)
         shape = Shape(
             words=len(vocabulary), views=len(d.views), size_px=d.size_px, scenes=len(scenes), named=len(words),
             **dict(m),
         )  # fmt: skip
-        self._about = checkpoints.PolicyInfo(
-            asdict(shape), vocabulary, self._sensors, release_fingerprint(root), actions_fingerprint(), words, scenes,
+        self._about = policy.PolicyInfo(
+            asdict(shape), vocabulary, sensors, release_fingerprint(root), actions_fingerprint(), words, scenes,
             "" if init is None else init.sha256,
         )  # fmt: skip
         torch.manual_seed(recipe.seed)
@@ -166,10 +166,9 @@ class _Training:
         network = Network(shape)
         if init is not None:
             init.copy_to(network)
-        self._learner = Learner(network, recipe, device)
         # The patch classifier is trained before the references.
         self._first = -1 if named else 0
-        self._learner.begin(self._first)
+        self._learner = Learner(network, recipe, device, self._first)
         self._reported = self._kept = time.monotonic()
         self._tensorboard: Any = None
         self._exploration: Pool | None = None
@@ -178,9 +177,9 @@ class _Training:
         recipe, learner, report = self._recipe, self._learner, self._reporter
         if restart:
             # The weights too: a phase that has some counts as done. The settings last, for a kill in between.
-            ended = [self._folder / f"{name}.safetensors" for name in ("sight", "imitation", "policy")]
-            for path in (*ended, *self._folder.glob("dagger-*.safetensors")):
-                path.unlink(missing_ok=True)
+            for name in ("sight", "imitation", "policy", "dagger-*"):
+                for path in self._folder.glob(f"{name}.safetensors"):
+                    path.unlink()
             for name in (_CHECKPOINT, _HISTORY, _SETTINGS):
                 (self._folder / name).unlink(missing_ok=True)
         self._check_settings()
@@ -198,22 +197,27 @@ class _Training:
                 f"train {recipe.name}: begins with {self._init.path}, scenes known: {scenes:,}, new: "
                 f"{len(about.scenes) - scenes:,}; words known: {words:,}, new: {len(about.vocabulary) - words:,}"
             )
-        self._tensorboard = _tensorboard(self._folder / "tensorboard")
-        parts = self._collect(self._parts(index, None), "drawing references")
-        self._exploration = self._explore()
+        with contextlib.suppress(ImportError):
+            boards = importlib.import_module("torch.utils.tensorboard")
+            self._tensorboard = boards.SummaryWriter(str(self._folder / "tensorboard"))
+        parts = self._collect(parts_of(self._common, index, recipe.seed), "drawing references")
+        d = recipe.data
+        if d.looks and d.views:
+            views = view_parts(self._common, index.scenes, d.looks, recipe.seed, d.target_split)
+            self._exploration = self._pool(self._collect(views, "rendering extra views"))
         for phase in range(self._first, recipe.dagger.rounds + 1):
             if phase > 0:
                 flown = self._weights(phase - 1)
-                share = recipe.dagger.teacher_share
-                flying = DaggerRound(flown, file_digest(flown), recipe.seed, phase, share)
-                parts += self._collect(self._parts(self._drawn(phase), flying), f"round {phase}: flying")
+                flying = DaggerRound(flown, file_digest(flown), recipe.seed, phase, recipe.dagger.teacher_share)
+                tasks = parts_of(replace(self._common, dagger_round=flying), self._drawn(phase), recipe.seed)
+                parts += self._collect(tasks, f"round {phase}: flying")
             if phase < learner.progress.phase or self._weights(phase).is_file():
                 continue
             if phase > learner.progress.phase:
                 learner.begin(phase)
             self._learn(parts, phase)
             weights = {n: t for n, t in learner.state().items() if n.startswith("network.")}
-            checkpoints.write(self._weights(phase), weights, self._about, asdict(learner.progress))
+            policy.write_weights(self._weights(phase), weights, self._about, asdict(learner.progress))
             self._save_checkpoint()
         last = self._folder / "policy.safetensors"
         # Its bytes, so that they stay the same: who began with these weights, or flies them, goes by their digest.
@@ -225,7 +229,7 @@ class _Training:
     def _read_index(self) -> tuple[Index, tuple[str, ...]]:
         """Read the training trajectories, and the words that images will be searched for."""
         d = self._recipe.data
-        index = read_index(self._root, Selection((d.split,), d.settings, (), d.scenes), d.target_split, d.runs)
+        index = read_index(self._common.data, Selection((d.split,), d.settings, (), d.scenes), d.target_split, d.runs)
         named: tuple[str, ...] = ()
         if d.looks and d.views and self._recipe.sight.epochs:
             # Of all targets, independent of the limit on trajectories.
@@ -234,96 +238,70 @@ class _Training:
         return (index if d.limit is None else index.take(sample_evenly(index, d.limit, self._recipe.seed))), named
 
     def _weights(self, phase: int) -> Path:
-        names = {-1: "sight", 0: "imitation"}
-        return self._folder / f"{names.get(phase, f'dagger-{phase}')}.safetensors"
+        return self._folder / f"{_PHASES.get(phase, f'dagger-{phase}')}.safetensors"
 
     def _drawn(self, phase: int) -> Index:
         """Draw a round's tasks, without those kept for validation."""
-        index, want = self._index, self._recipe.dagger.episodes
-        rank = [rng.rank(self._recipe.seed, "dagger tasks", phase, nav_id) for nav_id in index.nav_id]
-        free = np.flatnonzero(~self._held_out(np.array(index.nav_id)))
-        return index.take(np.sort(free[np.argsort(np.array(rank, np.uint64)[free], kind="stable")[:want]]))
-
-    def _parts(self, index: Index, dagger_round: DaggerRound | None) -> list[Part]:
-        parts = parts_of(
-            self._root, index, self._cache, self._selection, self._sensors, self._recipe.data.size_px,
-            self._recipe.seed, self._renderer, dagger_round,
-        )  # fmt: skip
-        return [replace(part, runs=self._recipe.data.runs) for part in parts]
+        index, free = self._index, np.flatnonzero(~self._held_out(self._index.nav_id)).tolist()
+        free.sort(key=lambda k: rng.rank(self._recipe.seed, "dagger tasks", phase, index.nav_id[k]))
+        return index.take(np.array(sorted(free[: self._recipe.dagger.episodes]), np.int64))
 
     def _collect(self, parts: list[Part], what: str) -> list[Steps]:
         with make_executor("local", self._workers) as executor:
             return collect(parts, executor, self._reporter, what)
 
-    def _explore(self) -> Pool | None:
-        d, scenes = self._recipe.data, self._index.scenes
-        if not (d.looks and d.views):
-            return None
-        like = self._parts(self._index, None)[0]
-        parts = view_parts(self._root, scenes, self._cache, d.split, d.target_split, d.looks, self._recipe.seed, like)
-        return self._pool(self._collect(parts, "rendering extra views"))
-
     def _pool(self, parts: list[Steps]) -> Pool:
         return Pool(parts, self._about.scenes, self._about.vocabulary)
 
-    def _held_out(self, nav_ids: NDArray[np.str_]) -> NDArray[np.bool_]:
+    def _held_out(self, nav_ids: Sequence[str]) -> NDArray[np.bool_]:
         share = self._recipe.data.validation_share * 2.0**64
-        return np.array([rng.rank(self._recipe.seed, "kept back", n) < share for n in nav_ids.tolist()], np.bool_)
+        return np.array([rng.rank(self._recipe.seed, "kept back", n) < share for n in nav_ids], np.bool_)
 
     def _learn(self, parts: list[Steps], phase: int) -> None:
         train, dagger = self._recipe.train, self._recipe.dagger
+        self._rate, self._what = Rate(), _PHASES.get(phase, f"round {phase}")
         if phase < 0 and self._exploration is not None:
             from aerialdojo_gen.learning.imitation import train_patch_classifier
 
-            log = self._log("sight", self._recipe.sight.epochs)
-            train_patch_classifier(self._learner, self._exploration, self._about.named, log)
+            train_patch_classifier(self._learner, self._exploration, self._about.named, self)
             return
         epochs, rate = (dagger.epochs, dagger.learning_rate) if phase else (train.epochs, train.learning_rate)
         pool = self._pool(parts)
-        log = self._log(f"round {phase}" if phase else "imitation", epochs)
-        self._learner.learn(pool, self._exploration, self._held_out(pool.nav_id), epochs, rate, log)
+        self._learner.learn(pool, self._exploration, self._held_out(pool.nav_id.tolist()), epochs, rate, self)
 
-    def _log(self, what: str, epochs: int) -> TrainingLog:
-        from aerialdojo_gen.learning.imitation import TrainingLog
-
-        rate = Rate()
-
-        def on_batch(done: int, total: int, loss: float, accuracy: float) -> None:
-            per_s = rate.per_s(done)
-            now = time.monotonic()
-            if self._tensorboard is not None:
-                self._tensorboard.add_scalar(f"{what}/loss", loss, done)
-                self._tensorboard.add_scalar(f"{what}/accuracy", accuracy, done)
-            if now - self._reported >= _REPORT_EVERY_S:
-                self._reported = now
-                left = f", {duration((total - done) / per_s)} left" if per_s else ""
-                self._reporter.line(
-                    f"{what}: batch {done:,} of {total:,}, loss {loss:.3f}, accuracy {accuracy:.1%}{left}"
-                )
-            if now - self._kept >= self._recipe.train.checkpoint_s:
-                self._save_checkpoint()
-
-        def on_epoch(row: dict[str, Any], left_s: float) -> None:
-            kept = f" (kept back: {_describe(row['kept_back'])})" if row["kept_back"] else ""
+    def on_batch(self, done: int, total: int, loss: float, accuracy: float) -> None:
+        per_s, now = self._rate.per_s(done), time.monotonic()
+        if self._tensorboard is not None:
+            self._tensorboard.add_scalar(f"{self._what}/loss", loss, done)
+            self._tensorboard.add_scalar(f"{self._what}/accuracy", accuracy, done)
+        if now - self._reported >= _REPORT_EVERY_S:
+            self._reported = now
+            left = f", {duration((total - done) / per_s)} left" if per_s else ""
             self._reporter.line(
-                f"{what}: epoch {row['epoch'] + 1} of {epochs}, loss {row['loss']:.3f}, accuracy "
-                f"{row['accuracy']:.1%}{kept}, {duration(left_s)} left"
+                f"{self._what}: batch {done:,} of {total:,}, loss {loss:.3f}, accuracy {accuracy:.1%}{left}"
             )
-            with (self._folder / _HISTORY).open("a", encoding="utf-8") as file:
-                file.write(json.dumps(row) + "\n")
+        if now - self._kept >= self._recipe.train.checkpoint_s:
             self._save_checkpoint()
 
-        return TrainingLog(on_batch, on_epoch)
+    def on_epoch(self, row: dict[str, Any], epochs: int, left_s: float) -> None:
+        kept = f" (kept back: {_describe(row['kept_back'])})" if row["kept_back"] else ""
+        self._reporter.line(
+            f"{self._what}: epoch {row['epoch'] + 1} of {epochs}, loss {row['loss']:.3f}, accuracy "
+            f"{row['accuracy']:.1%}{kept}, {duration(left_s)} left"
+        )
+        with (self._folder / _HISTORY).open("a", encoding="utf-8") as file:
+            file.write(json.dumps(row) + "\n")
+        self._save_checkpoint()
 
     def _save_checkpoint(self) -> None:
         progress = asdict(self._learner.progress)
-        checkpoints.write(self._folder / _CHECKPOINT, self._learner.state(), self._about, progress)
+        policy.write_weights(self._folder / _CHECKPOINT, self._learner.state(), self._about, progress)
         self._kept = time.monotonic()
 
     def _resume(self) -> None:
         path = self._folder / _CHECKPOINT
         if path.is_file():
-            tensors, _, state = checkpoints.read(path)
+            tensors, _, state = policy.read_weights(path)
             self._learner.restore(tensors, state)
         # An epoch in the history but not in the checkpoint is repeated.
         p, file = self._learner.progress, self._folder / _HISTORY
@@ -369,11 +347,3 @@ def _describe(kept: dict[str, Any]) -> str:
     suffix = f"; {' and '.join(known)} actions told" if known else ""
     off = f"{kept['goal_off_at_start_m']:.1f} m at the start, {kept['goal_off_m']:.1f} m in all"
     return f"{kept['accuracy']:.1%}; goal off by {off}{suffix}"
-
-
-def _tensorboard(folder: Path) -> Any:
-    """TensorBoard's writer; None if it is not installed."""
-    try:
-        return importlib.import_module("torch.utils.tensorboard").SummaryWriter(str(folder))
-    except ImportError:
-        return None

@@ -13,26 +13,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.base import rng
 from aerialdojo_gen.base.cli_context import command
 from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.base.names import as_names, check_known
 from aerialdojo_gen.benchmark.agents.goal import Sensors
 from aerialdojo_gen.benchmark.tasks import Selection, draw_evenly, mesh_of, reference_image
 from aerialdojo_gen.benchmark.worlds import make_worlds
-from aerialdojo_gen.learning.index import Index, read_indices
-from aerialdojo_gen.learning.labels import PRIVILEGED, Labels, scatter_rows, split_batch
-from aerialdojo_gen.learning.order import Order
-from aerialdojo_gen.learning.pictures import (
-    CachedFrames,
-    Frames,
-    RecordedFrames,
-    RenderedFrames,
-    Source,
-    join,
-    take,
-)
-from aerialdojo_gen.learning.words import PADDING, Vocabulary
+from aerialdojo_gen.learning import pictures
+from aerialdojo_gen.learning.index import Index, read_index
+from aerialdojo_gen.learning.labels import PRIVILEGED, labels_at, scatter_rows, split_batch
+from aerialdojo_gen.learning.loader import Order
+from aerialdojo_gen.learning.words import Vocabulary
 from aerialdojo_gen.store.cache import cache_folder
 from aerialdojo_gen.store.root import DataRoot, Where, open_root
 
@@ -48,9 +39,8 @@ class SampleOptions:
     setting: str | Sequence[str] = ()  # All where absent
     scene: str | Sequence[str] = ()  # Names or globs; all where absent
     target_split: str | None = None  # "train" or "test" of the split by objects, where the release has it
-    run: (
-        str | Sequence[str]
-    ) = ()  # Successful flights of these runs of `evaluate` or `fly` in place of the references
+    # Successful flights of these runs of `evaluate` or `fly` in place of the references.
+    run: str | Sequence[str] = ()
     limit: int | None = None  # Draw so many trajectories by `seed`, spread over the scenes
     seed: int = 0
     views: str | Sequence[str] = ("front",)  # Of front, left, right, down
@@ -161,11 +151,10 @@ class Trajectories:
         modalities = ("image",) if self.goal == ("image",) else ()
         chosen = Selection(as_names(split), as_names(own.setting), modalities, as_names(own.scene), None, own.seed)
         roots = _roots(release, worlds, of_worlds)
-        self.index = read_indices(roots, chosen, own.target_split, as_names(own.run), own.paraphrase)
+        self.index = read_index(roots, chosen, own.target_split, as_names(own.run), own.paraphrase)
         if own.limit is not None:
             self.index = self.index.take(sample_evenly(self.index, own.limit, own.seed))
         self._source = None if self.sensors.blind else self._open_source(own)
-        self._labels = Labels(self.index, self.privileged)
         steps = self.index.steps
         ends = np.ones(len(steps), np.int64) if own.past is None else (steps - 1) // own.stride + 1
         self._first = np.concatenate([[0], np.cumsum(ends)])
@@ -173,22 +162,21 @@ class Trajectories:
         self.vocabulary = own.vocabulary or Vocabulary.of(self._texts)
         self.fingerprint = self._fingerprint()
 
-    def _open_source(self, own: SampleOptions) -> Source:
+    def _open_source(self, own: SampleOptions) -> pictures.Source:
         """Open where pictures come from; of recordings alone only the trajectories that have one are kept."""
         # A scene without a mesh is named before the first epoch, not within it.
-        places = zip(self.index.roots, self.index.scenes, strict=True)
-        meshes = {name: mesh_of(root, name)[1] for root, name in places}
-        source: Source = RenderedFrames(self.index, self.sensors, own.renderer)
+        for scene, root in self.index.roots.items():
+            mesh_of(root, scene)
+        if own.source == "recordings":
+            self.index = recorded_alone(self.index, self.sensors, "source='render'")
+        source: pictures.Source = pictures.RenderedFrames(self.index, self.sensors, own.renderer)
         if own.source != "render":
-            if own.source == "recordings":
-                self.index = recorded_alone(self.index, self.sensors, "source='render'")
-                source = RenderedFrames(self.index, self.sensors, own.renderer)
-            source = RecordedFrames(self.index, self.sensors, source)
+            source = pictures.RecordedFrames(self.index, self.sensors, source)
         if not own.cache_gb:
             return source
         base = Path(own.cache_dir) if own.cache_dir is not None else cache_folder() / "learning"
-        drawn = {"source": own.source, "renderer": own.renderer}
-        return CachedFrames(source, self.index, self.sensors, meshes, base, int(own.cache_gb * 1e9), drawn)
+        most_bytes = int(own.cache_gb * 1e9)
+        return pictures.CachedFrames(source, self.index, self.sensors, base, most_bytes, own.source, own.renderer)
 
     def __len__(self) -> int:
         """Return the number of samples."""
@@ -218,7 +206,7 @@ class Trajectories:
         start : int
             The batch to begin with.
         **how
-            ``block``, ``streams``, ``shuffle`` and ``drop_last`` of `aerialdojo_gen.learning.order.Order`.
+            ``block``, ``streams``, ``shuffle`` and ``drop_last`` of `aerialdojo_gen.learning.loader.Order`.
         """
         return Order(self.index.scene, self._first, batch_size, seed=seed, epoch=epoch, start=start, **how)
 
@@ -237,14 +225,15 @@ class Trajectories:
         Samples of different T (whole trajectories) are padded at their front to the longest, with ``mask`` False.
         """
         places = [self.place(int(number)) for number in numbers]
-        window = max((end + 1 for _, end in places), default=1) if self.past is None else self.past + 1
+        window = max(end + 1 for _, end in places) if self.past is None else self.past + 1
         rows = np.array([k for k, _ in places], np.int64)
         ends = np.array([end for _, end in places], np.int64)
         steps = ends[:, None] + np.arange(1 - window, 1)
         mask = steps >= 0
         out: dict[str, Any] = {"mask": mask, "step": ends, "nav_id": [self.index.nav_id[k] for k, _ in places]}
         out |= self._goals(rows)
-        out |= self._labels.of(rows, steps, mask)
+        labels = [labels_at(self.index, k, steps[i, mask[i]], self.privileged) for i, (k, _) in enumerate(places)]
+        out |= {name: scatter_rows(np.concatenate([of[name] for of in labels]), mask) for name in labels[0]}
         frames = self._frames(np.broadcast_to(rows[:, None], steps.shape)[mask], steps[mask])
         for name, seen in frames.items():
             out[name] = seen.reshape(*mask.shape, *seen.shape[1:]) if mask.all() else scatter_rows(seen, mask)
@@ -255,35 +244,32 @@ class Trajectories:
         if "text" in self.goal:
             out["text"] = [self._texts[k] for k in rows]
         if "tokens" in self.goal:
-            found = [self.vocabulary.encode(self._texts[k]) for k in rows]
-            out["tokens"] = np.stack(found) if found else np.full((0, self.vocabulary.length), PADDING, np.int64)
+            out["tokens"] = np.stack([self.vocabulary.encode(self._texts[k]) for k in rows])
         if "image" in self.goal:
-            pictures = [self._image(int(k)) for k in rows]
-            empty = np.zeros(self._image_shape, np.uint8)
-            out["image"] = np.stack([empty if p is None else p for p in pictures])
-            out["has_image"] = np.array([p is not None for p in pictures])
+            ids = [self.index.goal_columns["reference_image_id"][k] for k in rows]
+            images = [i and reference_image(*self.index.sources[k], i) for k, i in zip(rows, ids, strict=True)]
+            out["image"] = np.stack([self._no_image if image is None else image for image in images])
+            out["has_image"] = np.array([i is not None for i in ids])
         return out
 
     @cached_property
-    def _image_shape(self) -> tuple[int, ...]:
+    def _no_image(self) -> NDArray[np.uint8]:
         # Of the selection, not of what was seen before: a batch without a picture is the same whenever it comes.
-        first = next((k for k, named in enumerate(self.index.goal_columns["reference_image_id"]) if named), None)
-        picture = None if first is None else self._image(first)
-        return (0, 0, 3) if picture is None else picture.shape
+        for source, image_id in zip(self.index.sources, self.index.goal_columns["reference_image_id"], strict=True):
+            if image_id is not None:
+                return np.zeros_like(reference_image(*source, image_id))
+        return np.zeros((0, 0, 3), np.uint8)
 
-    def _image(self, k: int) -> NDArray[np.uint8] | None:
-        named = self.index.goal_columns["reference_image_id"][k]
-        return None if named is None else reference_image(*self.index.scene_of(k), named)
-
-    def _frames(self, trajectories: NDArray[np.int64], steps: NDArray[np.int64]) -> Frames:
+    def _frames(self, trajectories: NDArray[np.int64], steps: NDArray[np.int64]) -> pictures.Frames:
         if self._source is None:
             return {}
         # Windows overlap: what two samples of a batch share is drawn once, a scene after the other.
-        keys, back = np.unique(
-            np.stack([self.index.scene[trajectories], trajectories, steps]), axis=1, return_inverse=True
-        )
-        parts = [self._source.frames(*keys[1:, keys[0] == scene].astype(np.int64)) for scene in np.unique(keys[0])]
-        return take(join(parts), np.asarray(back, np.int64).ravel())
+        keys = np.stack([self.index.scene[trajectories], trajectories, steps])
+        (scenes, *drawn), back = np.unique(keys, axis=1, return_inverse=True)
+        out = pictures.empty_frames(self.sensors, len(scenes))
+        for rows in (np.flatnonzero(scenes == scene) for scene in np.unique(scenes)):
+            pictures.put(out, rows, self._source.frames(*(of[rows].astype(np.int64) for of in drawn)))
+        return pictures.take(out, np.asarray(back, np.int64).ravel())
 
     def _fingerprint(self) -> str:
         s = self.sensors
@@ -311,7 +297,7 @@ def _roots(
 
 def recorded_alone(index: Index, sensors: Sensors, else_: str) -> Index:
     """Keep the trajectories that have a recording; UsageError, which names what to choose else, without any."""
-    recorded = RecordedFrames(index, sensors, RenderedFrames(index, sensors, "auto"))
+    recorded = pictures.RecordedFrames(index, sensors, pictures.RenderedFrames(index, sensors, "auto"))
     has = np.flatnonzero([recorded.has(k) for k in range(len(index))])
     if not len(has):
         raise UsageError(
@@ -325,13 +311,9 @@ def sample_evenly(index: Index, limit: int, seed: int) -> NDArray[np.int64]:
     """Draw rows of the index, ascending, spread evenly over the scenes; a larger limit only adds to them."""
     if limit < 1:
         raise UsageError(f"a limit is at least 1, not {limit}")
-    scenes = [index.scenes[number] for number in index.scene]
-    return np.array(draw_evenly(scenes, index.nav_id, limit, seed, "learning"), np.int64)
-
-
-def sampling_key(seed: int, nav_id: str) -> int:
-    """Return by what `sample_evenly` orders the trajectories of a scene."""
-    return rng.rank(seed, "learning", nav_id)
+    return np.array(
+        draw_evenly([scene for _, scene in index.sources], index.nav_id, limit, seed, "learning"), np.int64
+    )
 
 
 def _chosen(what: str, given: str | Sequence[str], known: Sequence[str]) -> tuple[str, ...]:

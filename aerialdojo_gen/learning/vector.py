@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any, SupportsFloat
 
@@ -14,7 +14,7 @@ from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv
 from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.benchmark.env import AerialDojoEnv, make_env
 from aerialdojo_gen.benchmark.tasks import mesh_of
-from aerialdojo_gen.learning.geodesic import geodesic
+from aerialdojo_gen.learning.labels import geodesic
 from aerialdojo_gen.learning.words import Vocabulary, goal_text
 from aerialdojo_gen.store.root import Where, open_root
 from aerialdojo_gen.store.schemas import DIRECTIONS
@@ -29,7 +29,7 @@ def _innermost(env: gymnasium.Env[Any, Any], what: str) -> AerialDojoEnv:
 class ProgressReward(gymnasium.Wrapper[dict[str, Any], np.int64, dict[str, Any], np.int64]):
     """Adds to the reward what an action brings the body nearer to the goal, on ways that it can fly.
 
-    The distance is `aerialdojo_gen.learning.geodesic.Geodesic`'s. With a discount of 1 what is added over an episode
+    The distance is `aerialdojo_gen.learning.labels.Geodesic`'s. With a discount of 1 what is added over an episode
     is the distance at the start less that at the end, times `scale`: a potential, which changes no optimal policy.
 
     Parameters
@@ -87,8 +87,8 @@ class ProgressReward(gymnasium.Wrapper[dict[str, Any], np.int64, dict[str, Any],
 
     def _goal_distance_m(self) -> float:
         env = self._own
-        ways = geodesic(*mesh_of(env.data, env.task.row["scene"]), env.radius_m)
-        return float(ways.distances_m(env.task.goal, [env.episode.position])[0])
+        geodesics = geodesic(*mesh_of(env.data, env.task.row["scene"]), env.radius_m)
+        return float(geodesics.distances_m(env.task.goal, [env.episode.position])[0])
 
 
 class OwnScenes(gymnasium.Wrapper[dict[str, Any], np.int64, dict[str, Any], np.int64]):
@@ -180,6 +180,10 @@ def _make_one(data: str, options: dict[str, Any], wrappers: Sequence[Callable[..
     return env
 
 
+# How the views of a step become one array.
+_JOIN: Mapping[str, Callable[..., Any]] = {"rgb": np.concatenate, "depth_m": np.stack}
+
+
 class Flattened(gymnasium.ObservationWrapper[dict[str, Any], np.int64, dict[str, Any]]):
     """Observations of one level without texts, for learners that read arrays alone (Stable-Baselines3).
 
@@ -200,18 +204,12 @@ class Flattened(gymnasium.ObservationWrapper[dict[str, Any], np.int64, dict[str,
         self.vocabulary = vocabulary or Vocabulary.of(goal_text(*said) for said in own.goals_in_words())
         seen = own.observation_space
         tokens = spaces.Box(0, len(self.vocabulary) - 1, (self.vocabulary.length,), np.int64)
-        flat: dict[str, spaces.Space[Any]] = {
-            "tokens": tokens,
-            "remaining_actions": seen["remaining_actions"],
-            "refused": spaces.Box(0, 1, (1,), np.int32),
-        }
-        if "rgb" in seen.spaces:
-            views = list(seen["rgb"].spaces.values())  # type: ignore[attr-defined]
-            height, width, _ = views[0].shape
-            flat["rgb"] = spaces.Box(0, 255, (height, width, 3 * len(views)), np.uint8)
-        if "depth_m" in seen.spaces:
-            views = list(seen["depth_m"].spaces.values())  # type: ignore[attr-defined]
-            flat["depth_m"] = spaces.Box(0.0, float(views[0].high.max()), (*views[0].shape, len(views)), np.float32)
+        refused = spaces.Box(0, 1, (1,), np.int32)
+        flat = {"tokens": tokens, "remaining_actions": seen["remaining_actions"], "refused": refused}
+        for name in _JOIN.keys() & seen.spaces.keys():
+            views: list[Any] = list(seen[name].spaces.values())  # type: ignore[attr-defined]
+            low, high = (_JOIN[name]([getattr(view, end) for view in views], axis=-1) for end in ("low", "high"))
+            flat[name] = spaces.Box(low, high, dtype=views[0].dtype)
         self.observation_space = spaces.Dict(flat)
 
     def observation(self, observation: dict[str, Any]) -> dict[str, Any]:
@@ -223,8 +221,6 @@ class Flattened(gymnasium.ObservationWrapper[dict[str, Any], np.int64, dict[str,
             "remaining_actions": observation["remaining_actions"],
             "refused": np.array([observation["refused"]], np.int32),
         }
-        if "rgb" in observation:
-            flat["rgb"] = np.concatenate(list(observation["rgb"].values()), axis=-1)
-        if "depth_m" in observation:
-            flat["depth_m"] = np.stack(list(observation["depth_m"].values()), axis=-1)
+        for name in _JOIN.keys() & observation.keys():
+            flat[name] = _JOIN[name](list(observation[name].values()), axis=-1)
         return flat

@@ -17,8 +17,8 @@ _WORD = re.compile(r"\w+|[^\w\s]")
 
 def goal_text(target_name: str, landmark: str, direction: str, description: str | None) -> str:
     """Say a goal in words, as the task gives it: name, direction from the landmark, and any description."""
-    said = f"{target_name}, {direction} of {landmark}"
-    return f"{said}. {description}" if description else said
+    text = f"{target_name}, {direction} of {landmark}"
+    return f"{text}. {description}" if description else text
 
 
 def words_of(text: str) -> list[str]:
@@ -69,10 +69,10 @@ class Vocabulary:
 _STOP_WORDS = frozenset({"a", "an", "and", "at", "by", "for", "from", "in", "of", "on", "the", "to", "with"})
 
 
-def name_vocabulary(names: Iterable[str], at_least: int = 2) -> tuple[str, ...]:
-    """Collect the words of objects' names that occur in enough of them, by the alphabet."""
+def name_vocabulary(names: Iterable[str]) -> tuple[str, ...]:
+    """Collect the words of objects' names that occur in two of them at least, by the alphabet."""
     counted = Counter(word for name in names for word in set(words_of(name)))
-    return tuple(sorted(w for w, n in counted.items() if n >= at_least and w.isalpha() and w not in _STOP_WORDS))
+    return tuple(sorted(w for w, n in counted.items() if n >= 2 and w.isalpha() and w not in _STOP_WORDS))
 
 
 def word_targets(names: Sequence[str], words: Sequence[str]) -> NDArray[np.float32]:

@@ -116,8 +116,10 @@ def test_episodes_are_the_navigation_tasks(habitat, smoke, split, scene):
         assert to_world(episode.info["goal_position"]) == points[-1].tolist()
 
 
-def test_goals_are_all_objects_seen_from_their_anchors(habitat, smoke):
-    goals, _, _ = load(habitat / "id_train/content/U_Courtyard_0.json.gz")
+def test_goals_are_all_objects_of_the_mesh_seen_from_their_anchors(habitat, smoke):
+    goals, episodes, _ = load(habitat / "id_train/content/U_Courtyard_0.json.gz")
+    mesh = trimesh.load_scene(smoke / episodes[0].scene_id)
+    parents = mesh.graph.transforms.parents
     objects = pd.read_parquet(smoke / "release/objects").query("scene == 'U_Courtyard_0'").set_index("object_id")
     anchors = pd.read_parquet(smoke / "release/anchors").query("scene == 'U_Courtyard_0'")
     found = {goal.object_id: goal for values in goals.values() for goal in values}
@@ -125,6 +127,10 @@ def test_goals_are_all_objects_seen_from_their_anchors(habitat, smoke):
     for number, goal in found.items():
         row = objects.loc[number]
         assert to_world(goal.position) == [row["x_m"], row["y_m"], row["z_m"]]
+        # Where the mesh has it.
+        parts = [mesh.graph.get(node) for node in mesh.graph.nodes_geometry if parents[node] == row["mesh_node"]]
+        corners = np.vstack([trimesh.transform_points(mesh.geometry[name].vertices, t) for t, name in parts])
+        assert (corners.min(axis=0) + corners.max(axis=0)) / 2 == pytest.approx(goal.position, abs=1e-3)
         mine = anchors[anchors["object_id"] == number]
         assert len(goal.view_points) == len(mine)
         for view, (_, anchor) in zip(goal.view_points, mine.iterrows(), strict=True):
@@ -144,18 +150,3 @@ def test_the_size_is_announced_and_the_same_release_gives_the_same_bytes(habitat
     assert size.files == len(files)
     assert size.bytes == pytest.approx(sum(map(len, files.values())), rel=0.6)
     assert said.getvalue().startswith(f"export: {size}, into {tmp_path / 'again'}")
-
-
-def test_goals_lie_where_the_meshes_have_their_objects(habitat, smoke):
-    goals, episodes, _ = load(habitat / "id_train/content/U_Courtyard_0.json.gz")
-    mesh = trimesh.load_scene(smoke / episodes[0].scene_id)
-    parents = mesh.graph.transforms.parents
-    objects = pd.read_parquet(smoke / "release/objects").query("scene == 'U_Courtyard_0'").set_index("object_id")
-    for goal in (goal for values in goals.values() for goal in values):
-        points = []
-        for node in mesh.graph.nodes_geometry:
-            if parents[node] == objects.loc[goal.object_id, "mesh_node"]:
-                transform, name = mesh.graph.get(node)
-                points.append(trimesh.transform_points(mesh.geometry[name].vertices, transform))
-        corners = np.vstack(points)
-        assert (corners.min(axis=0) + corners.max(axis=0)) / 2 == pytest.approx(goal.position, abs=1e-3)

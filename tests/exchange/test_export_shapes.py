@@ -11,7 +11,8 @@ from support.command_line import called
 from support.handmade import box, instance, mesh_of, scene
 
 from aerialdojo_gen.base.errors import AerialDojoError, StoreError, UsageError
-from aerialdojo_gen.exchange.shape_export import export_shapes, sample_surface
+from aerialdojo_gen.exchange.exporting import export_shapes
+from aerialdojo_gen.exchange.shape_export import sample_surface
 from aerialdojo_gen.geometry.soup import soup
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.occupancy import SLACK_M, Occupancy

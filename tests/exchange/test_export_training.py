@@ -55,7 +55,7 @@ def seen(smoke, lerobot):
     return [whole[number[nav_id]] for nav_id in lerobot.episodes["nav_id"]]
 
 
-def test_lerobot_has_the_loaders_labels(lerobot, seen):
+def test_lerobot_has_the_loaders_labels_and_actions(lerobot, seen):
     assert len(seen) == len(lerobot.episodes) > 3
     assert set(lerobot.episodes["setting"]) >= {"base", "standard"}
     for episode, sample in enumerate(seen):
@@ -67,9 +67,7 @@ def test_lerobot_has_the_loaders_labels(lerobot, seen):
         assert own["next.done"].to_list() == [False] * (len(own) - 1) + [True]
         (task,) = lerobot.episodes.loc[episode, "tasks"]
         assert task == sample["text"]
-
-
-def test_lerobots_continuous_actions_fly_what_the_discrete_ones_do(lerobot):
+    # Continuous actions fly what the discrete ones do.
     actions, discrete = lerobot.columns("action"), lerobot.columns("discrete_action")
     assert lerobot.info["features"]["action"]["names"] == ["forward_m", "left_m", "up_m", "turn_rad", "stop"]
     for action in np.unique(discrete):
@@ -106,14 +104,13 @@ def test_lerobots_statistics_are_those_of_the_pictures_and_columns(lerobot, seen
         ):  # fmt: skip
             assert stats[name].ravel() == pytest.approx(expected, abs=1e-9), name
         depth = np.concatenate([s["depth_m"][:, v].ravel() for s in seen])
-        found = lerobot.stats[f"observation.depth.{view}"]
-        assert found["mean"].item() == pytest.approx(depth.mean(), abs=0.01)
-        assert found["std"].item() == pytest.approx(depth.std(), abs=0.01)
+        for statistic in ("mean", "std"):
+            found = lerobot.stats[f"observation.depth.{view}"][statistic].item()
+            assert found == pytest.approx(getattr(depth, statistic)(), abs=0.01)
     for name in ("observation.state", "action", "discrete_action"):
-        values = lerobot.columns(name).reshape(len(lerobot.frames), -1)
-        assert lerobot.stats[name]["mean"] == pytest.approx(values.mean(0, dtype=np.float64))
-        assert lerobot.stats[name]["std"] == pytest.approx(values.std(0, dtype=np.float64))
-        assert lerobot.stats[name]["max"] == pytest.approx(values.max(0))
+        values = lerobot.columns(name).reshape(len(lerobot.frames), -1).astype(np.float64)
+        for statistic in ("mean", "std", "max"):
+            assert lerobot.stats[name][statistic] == pytest.approx(getattr(values, statistic)(0))
     row = lerobot.episodes.loc[1]
     own = seen[1]["rgb"][:, 0].reshape(-1, 3) / 255.0
     told = np.array([[[float(x) for x in b] for b in a] for a in row["stats/observation.images.front/mean"]])
@@ -184,13 +181,6 @@ def test_webdataset_reads_the_shards_back(made, seen, lerobot):
     assert at == len(samples)
 
 
-@pytest.mark.nightly
-def test_the_same_bytes_by_any_number_of_workers(made, smoke, tmp_path):
-    again = export_for_learning("lerobot", smoke, tmp_path / "again", ExportOptions(**OPTIONS), workers=2)
-    assert again == made[1]["lerobot"]
-    assert files_of(tmp_path / "again") == files_of(made[0] / "lerobot")
-
-
 def test_the_same_data_in_other_parts(made, smoke, tmp_path, monkeypatch):
     monkeypatch.setattr(lerobot_writer, "frames_a_part", lambda options: 20)
     cut = export_for_learning("lerobot", smoke, tmp_path / "cut", ExportOptions(**OPTIONS), workers=1)
@@ -237,7 +227,7 @@ export_for_learning("webdataset", sys.argv[1], pathlib.Path(sys.argv[2]), Export
     assert not unfinished.exists()
 
 
-def test_parts_of_another_request_are_not_gone_on_with(smoke, tmp_path):
+def test_parts_of_another_request_are_not_gone_on_with(tmp_path):
     def parts(request):
         unfinished = PartialExport(tmp_path / "export", request)
         with unfinished.locked():
@@ -252,41 +242,32 @@ def test_parts_of_another_request_are_not_gone_on_with(smoke, tmp_path):
     assert parts({"size": 2}) == []
 
 
-def test_recordings_are_read_where_there_are_some(smoke, tmp_path):
-    """What is not recorded is left out by recordings, and drawn by auto."""
-    sensors = Sensors(("front",), depth=False, width=64, height=64)
-    options = ExportOptions(("all",), source="recordings", sensors=sensors)
-    made = export_for_learning("webdataset", smoke, tmp_path / "recorded", options, workers=1)
-    assert 0 < made.counts["trajectories"] < 10
-
-
-def test_an_estimate_writes_nothing_and_counts_what_the_export_has(made, smoke, tmp_path):
-    asked = ("export", "--format", "lerobot", "--data", smoke, "--out", tmp_path / "x", "--limit", 1, "--estimate")
-    done = called(*asked, "--json")
-    assert done.returncode == 0, done.stderr
-    told, counts = json.loads(done.stdout), made[1]["lerobot"].counts
-    assert (told["frames"], told["trajectories"]) == (counts["frames"], counts["episodes"])
-    assert told["cpu_s"] > 0
-    assert told["size_bytes"] > 0
-    assert not list(tmp_path.iterdir())
-    assert "trajectories" in called(*asked).stdout
-
-
-def test_the_command_says_what_it_made_and_does_not_replace_it_unasked(smoke, tmp_path):
+def test_the_command_estimates_says_what_it_made_and_does_not_replace_it_unasked(smoke, tmp_path):
     options = "--limit 1 --width 16 --no-depth --jpeg-quality 80 --workers 1"
     asked = ("export", "--format", "webdataset", "--data", smoke, "--out", tmp_path / "x", *options.split())
+    estimated, estimate = called(*asked, "--estimate"), json.loads(called(*asked, "--estimate", "--json").stdout)
+    assert not list(tmp_path.iterdir())
+    assert "trajectories" in estimated.stdout
+    assert min(estimate["cpu_s"], estimate["size_bytes"]) > 0
     done = called(*asked, "--json")
     assert done.returncode == 0, done.stderr
-    assert json.loads(done.stdout)["counts"]["shards"] == 2
+    counts = json.loads(done.stdout)["counts"]
+    assert counts["shards"] == 2
+    assert (estimate["frames"], estimate["trajectories"]) == (counts["samples"], counts["trajectories"])
     before = files_of(tmp_path / "x")
     again = called(*asked)
     assert again.returncode == 2
     assert "--force replaces it" in again.stderr
-    assert called(*asked, "--force", "--quiet").stdout == ""
+    # By two workers the same bytes.
+    assert called(*asked[:-1], "2", "--force", "--quiet").stdout == ""
     assert files_of(tmp_path / "x") == before
 
 
-def test_a_release_without_meshes_and_one_without_recordings_are_named(planted, tmp_path):
+def test_recordings_are_read_and_a_release_without_them_or_without_meshes_is_named(smoke, planted, tmp_path):
+    sensors = Sensors(("front",), depth=False, width=64, height=64)
+    options = ExportOptions(("all",), source="recordings", sensors=sensors)
+    made = export_for_learning("webdataset", smoke, tmp_path / "recorded", options, workers=1)
+    assert 0 < made.counts["trajectories"] < 10, "what is not recorded is left out"
     with pytest.raises(UsageError, match=r"has a recording of the views asked for: run .*render.*--source render"):
         export_for_learning("lerobot", planted.data, tmp_path / "x", ExportOptions(source="recordings"))
     shutil.rmtree(planted.data / "meshes")

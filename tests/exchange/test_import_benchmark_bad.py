@@ -184,6 +184,13 @@ LAYOUT_BAD = [
 ]
 
 
+def bad_lines(layout: Path, data: Path) -> list[str]:
+    report = import_benchmark("aerialdojo", [layout], data, Options(skip_bad=True))
+    lines = (data / "imported/aerialdojo/bad_records.txt").read_text().splitlines()
+    assert report.n_bad == len(lines)
+    return lines
+
+
 def test_bad_tasks_of_the_authors_layout_are_named(layout, tmp_path):
     """Each in a row of its own, after a good one."""
     path = layout / "SemanticOGS" / PART / "Task.json"
@@ -191,9 +198,7 @@ def test_bad_tasks_of_the_authors_layout_are_named(layout, tmp_path):
     for task, (field, value, *_) in zip(tasks[1:], LAYOUT_BAD, strict=False):
         put(task, field, value)
     path.write_text(json.dumps(tasks))
-    report = import_benchmark("aerialdojo", [layout], tmp_path / "data", Options(skip_bad=True))
-    lines = (tmp_path / "data/imported/aerialdojo/bad_records.txt").read_text().splitlines()
-    assert report.n_bad == len(lines) == len(LAYOUT_BAD)
+    lines = bad_lines(layout, tmp_path / "data")
     for row, (line, (_, _, named, why)) in enumerate(zip(lines, LAYOUT_BAD, strict=True), 1):
         assert line.startswith(f"SemanticOGS/{PART}/Task.json: row {row}: {named}")
         assert why in line
@@ -237,9 +242,7 @@ TRAJECTORY_BAD = [
 def test_bad_trajectories_are_named_for_both_instances(layout, tmp_path):
     for number, (place, value, *_) in enumerate(TRAJECTORY_BAD):
         spoil_trajectory(layout, number, lambda d, place=place, value=value: put(d, place, value))
-    report = import_benchmark("aerialdojo", [layout], tmp_path / "data", Options(skip_bad=True))
-    lines = (tmp_path / "data/imported/aerialdojo/bad_records.txt").read_text().splitlines()
-    assert report.n_bad == len(lines) == 2 * len(TRAJECTORY_BAD)
+    lines = bad_lines(layout, tmp_path / "data")
     expected = [(kind, number) for kind in ("ImageOGS", "SemanticOGS") for number in range(len(TRAJECTORY_BAD))]
     for line, (kind, number) in zip(lines, expected, strict=True):
         *_, field, why = TRAJECTORY_BAD[number]
@@ -278,12 +281,8 @@ def test_pictures_stay_in_their_folder_and_are_pictures(layout, tmp_path):
     (folder / text).write_text("no picture")
     tasks = [task | {"image": outside} if task["image"] == elsewhere else task for task in tasks]
     (folder / "Task.json").write_text(json.dumps(tasks))
-    why = {
-        absent: "there is no file",
-        link: "points outside",
-        outside: "points outside",
-        text: "neither PNG nor JPEG",
-    }
+    why = dict.fromkeys((link, outside), "points outside")
+    why |= {absent: "there is no file", text: "neither PNG nor JPEG"}
     with pytest.raises(ImportRefused) as refused:
         import_benchmark("aerialdojo", [layout], tmp_path / "data")
     lines = str(refused.value).splitlines()[1:]

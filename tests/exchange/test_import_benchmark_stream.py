@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from support import task_files
 
 from aerialdojo_gen.base.errors import ImportRefused
-from aerialdojo_gen.exchange import jsonstream
+from aerialdojo_gen.exchange import records as records_module
 from aerialdojo_gen.exchange.importing import Options, import_benchmark
-from aerialdojo_gen.exchange.jsonstream import records, small_document
+from aerialdojo_gen.exchange.records import records, small_document
 
 values = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text(),
@@ -26,14 +26,12 @@ values = st.recursive(
 @given(st.lists(values, max_size=8), st.sampled_from([1, 2, 7, 64]), st.sampled_from([None, 0, 3]), st.booleans())
 def test_records_are_what_json_reads_whatever_the_chunks(tmp_path_factory, rows, chunk, indent, ascii_only):
     path = tmp_path_factory.mktemp("json") / "rows.json"
-    path.write_text(json.dumps(rows, indent=indent, ensure_ascii=ascii_only), "utf-8", errors="surrogatepass") if (
-        ascii_only
-    ) else path.write_bytes(json.dumps(rows, indent=indent, ensure_ascii=False).encode("utf-8", "replace"))
+    path.write_bytes(json.dumps(rows, indent=indent, ensure_ascii=ascii_only).encode("utf-8", "replace"))
     expected = json.loads(path.read_bytes())
     under = path.with_name("under.json")
     under.write_text(json.dumps({"before": [1, {"episodes": 2}], "episodes": expected, "after": "x"}))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(jsonstream, "_CHUNK", chunk)
+        patch.setattr(records_module, "_CHUNK", chunk)
         assert list(records(path)) == expected
         assert list(records(under, "episodes")) == expected
 
@@ -47,6 +45,7 @@ def test_records_are_what_json_reads_whatever_the_chunks(tmp_path_factory, rows,
         ('[{"a": 1}', None, r"row 0: expected , or \], found the end of the file \(is it truncated\?\)"),
         ('[{"a": 1} {"a": 2}]', None, r"row 0: expected , or \], found '{'"),
         ('[{"a": 1},]', None, "row 1: damaged or truncated"),
+        ('{"episodes": [1],}', "episodes", "the end: damaged or truncated"),
         ('[{"a": 1}] x', None, "the end: 'x' after the end of the value"),
         ("[" * 100_000, None, "row 0: nested more than 64 deep"),
         ('[{"a": ' + "9" * 5000 + "}]", None, "row 0: damaged or truncated"),
@@ -64,27 +63,21 @@ def test_damage_is_named_by_its_row(tmp_path, text, key, error):
     assert "\n" not in str(refused.value)
 
 
-def test_a_record_beyond_the_limit_is_refused_by_name(tmp_path):
+def test_a_record_or_document_beyond_the_limit_is_refused_by_name(tmp_path, monkeypatch):
     rows = task_files.uav_on(3)
     rows[1]["description"] = "x" * 5_000_000
-    path = task_files.write(tmp_path / "long.json", rows)
+    path, document = task_files.write(tmp_path / "long.json", rows), task_files.write(tmp_path / "t.json", rows[1])
+    import_benchmark("uav-on", [path], tmp_path, name="whole")
+    assert pd.read_parquet(tmp_path / "imported/whole/tasks")["description"].str.len().max() == 5_000_000
+    assert small_document(document) == rows[1]
+    monkeypatch.setattr(records_module, "RECORD_LIMIT", 1 << 20)
     with pytest.raises(ImportRefused, match=r"long\.json: row 1: larger than 1,024 KiB"):
-        import_benchmark("uav-on", [path], tmp_path, Options(record_limit=1 << 20, skip_bad=True))
+        import_benchmark("uav-on", [path], tmp_path, Options(skip_bad=True))
     assert not (tmp_path / "imported/uav-on").exists()
     # The record before it was read already: the limit is one of a record, not of the file.
-    taken = records(path, limit=1 << 20)
-    assert next(taken)["episode_id"] == "0"
-    with pytest.raises(ImportRefused, match="row 1: larger than"):
-        next(taken)
-    import_benchmark("uav-on", [path], tmp_path)
-    assert pd.read_parquet(tmp_path / "imported/uav-on/tasks")["description"].str.len().max() == 5_000_000
-
-
-def test_a_document_beyond_the_limit_is_refused(tmp_path):
-    path = task_files.write(tmp_path / "t.json", {"a": "x" * 2000})
-    with pytest.raises(ValueError, match="is larger than 1 KiB"):
-        small_document(path, limit=1024)
-    assert small_document(path, limit=4096) == {"a": "x" * 2000}
+    assert next(records(path))["episode_id"] == "0"
+    with pytest.raises(ValueError, match="is larger than 1,024 KiB"):
+        small_document(document)
 
 
 MEASURE = """

@@ -20,7 +20,7 @@ def files_of(data: Path) -> dict[str, bytes]:
 
 @pytest.mark.pipeline
 def test_a_world_runs_through_the_stages_by_its_mesh_until_its_plan_is_edited(tmp_path: Path) -> None:
-    """Worlds to train on, from seed 1000 on, do so in `tests/learning/test_several_places.py`."""
+    """Worlds to train on, from seed 1000 on, do so in `tests/learning/test_trajectories.py`."""
     out, options = tmp_path / "worlds", VaryOptions({"occupancy": 0.4}, n_objects=2)
     (one,) = vary(["U_Parking*"], WORLD[1], out, options)
     assert one.made

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from aerialdojo_gen.base.errors import MissingPackage, StoreError, UsageError
 from aerialdojo_gen.learning import Loader, Trajectories
-from aerialdojo_gen.learning.order import Order
+from aerialdojo_gen.learning.loader import Order
 
 WITHOUT = "PyTorch is not installed: it is the extra 'train'"
 
@@ -41,16 +41,12 @@ def test_an_epoch_has_every_sample_once_and_goes_on_anywhere(world, size, block,
     assert full == [b for b in batches if len(b) == size]
 
 
-def test_epochs_and_seeds_differ():
-    scene, first = np.repeat([0, 1, 2], 30), np.arange(0, 91 * 10, 10)
+def test_epochs_and_seeds_differ_and_a_worker_has_one_scene_open_as_long_as_a_block():
+    """Batches of one stream change their scene once a block, not once a batch."""
+    scene, first = np.repeat(np.arange(10), 100), np.arange(0, 1001 * 20, 20)
     orders = [list(Order(scene, first, 16, seed=s, epoch=e)) for s in (0, 1) for e in (0, 1)]
     assert len({str(order) for order in orders}) == 4
     assert next(iter(Order(scene, first, 100, shuffle=False))) == list(range(100))
-
-
-def test_a_worker_has_one_scene_open_as_long_as_a_block():
-    """Batches of one stream change their scene once a block, not once a batch."""
-    scene, first = np.repeat(np.arange(10), 100), np.arange(0, 1001 * 20, 20)
     batches = list(Order(scene, first, 32, block=500, streams=2))
     for worker in (0, 1):
         own = [scene[np.searchsorted(first, np.array(b), side="right") - 1] for b in batches[worker::2]]

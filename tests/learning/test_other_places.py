@@ -1,6 +1,7 @@
 """Policies in places that they have no map of: what objects look like, and weights that are taken elsewhere."""
 
 import json
+from collections import Counter
 from functools import partial
 
 import numpy as np
@@ -24,15 +25,14 @@ from aerialdojo_gen.benchmark.scoring import score
 from aerialdojo_gen.benchmark.tasks import Selection
 from aerialdojo_gen.cli import app as cli
 from aerialdojo_gen.learning.index import read_index
+from aerialdojo_gen.learning.policy import Policy, read_weights
+from aerialdojo_gen.learning.search import Search
 from aerialdojo_gen.store.files import file_digest
 from aerialdojo_gen.store.root import open_root
 
 torch = pytest.importorskip("torch", reason="PyTorch is not installed: it is the extra 'train'")
 
-from aerialdojo_gen.learning import checkpoints  # noqa: E402 - it needs torch
-from aerialdojo_gen.learning.localization import UNIT_M  # noqa: E402
-from aerialdojo_gen.learning.policy import Policy  # noqa: E402
-from aerialdojo_gen.learning.search import Search  # noqa: E402
+from aerialdojo_gen.learning.network import UNIT_M  # noqa: E402 - it needs torch
 
 TEXT = """
 name = "sight"
@@ -91,7 +91,7 @@ def test_patches_are_told_by_the_names_of_what_they_show(smoke, learned):
     rows = [row for row in history(learned.parent) if row["phase"] == -1]
     assert [row["epoch"] for row in rows] == list(range(12))
     assert rows[-1]["accuracy"] > max(0.6, rows[0]["accuracy"] + 0.1)
-    _, about, _ = checkpoints.read(learned)
+    _, about, _ = read_weights(learned)
     index = read_index(open_root(smoke), Selection(("id_train",)))
     said = " ".join(index.goal_columns["target_name"]).lower().split()
     assert about.named
@@ -100,7 +100,7 @@ def test_patches_are_told_by_the_names_of_what_they_show(smoke, learned):
 
 def test_what_is_seen_is_learned_apart_from_all_else(learned, sightless):
     """With it and without it the map and the choice are the same, to the bit."""
-    without, with_it = (checkpoints.read(path)[0] for path in (sightless, learned))
+    without, with_it = (read_weights(path)[0] for path in (sightless, learned))
     assert not any(".sight." in name for name in without)
     assert {name for name in with_it if ".sight." not in name} == set(without)
     assert all(torch.equal(with_it[name], tensor) for name, tensor in without.items())
@@ -111,63 +111,60 @@ def test_killed_while_it_learns_to_see_it_goes_on_and_ends_the_same(smoke, cache
     file, out = tmp_path / "own.toml", tmp_path / "out"
     file.write_text(TEXT)
     kill_at_first_checkpoint(file, smoke, out, cache)
-    assert checkpoints.read(out / "checkpoint.safetensors")[2]["phase"] == -1
+    assert read_weights(out / "checkpoint.safetensors")[2]["phase"] == -1
     assert not (out / "sight.safetensors").exists()
     assert_same_training(learned, train_here(smoke, recipe(), out, cache).policy)
 
 
-class CountedSearch(Search):
-    """The search, with its calls counted."""
-
-    looked = led = 0
-
-    def observe(self, log_chances, pictures, odometry):
-        CountedSearch.looked += 1
-        assert np.allclose(np.exp(log_chances).sum(axis=1), 1.0, atol=1e-4)
-        super().observe(log_chances, pictures, odometry)
-
-    def towards(self, odometry, remaining):
-        CountedSearch.led += 1
-        return super().towards(odometry, remaining)
-
-
 @pytest.fixture
-def lost_from(monkeypatch):
-    """Set how unsure of its place a policy has to be, in nats, to search."""
+def calls(monkeypatch):
+    """The calls of the search, counted."""
+    calls = Counter()
+
+    class CountedSearch(Search):
+        def observe(self, log_chances, pictures, odometry):
+            calls["observe"] += 1
+            assert np.allclose(np.exp(log_chances).sum(axis=1), 1.0, atol=1e-4)
+            super().observe(log_chances, pictures, odometry)
+
+        def towards(self, odometry, remaining):
+            calls["towards"] += 1
+            return super().towards(odometry, remaining)
+
     monkeypatch.setattr("aerialdojo_gen.learning.policy.Search", CountedSearch)
-    monkeypatch.setattr(CountedSearch, "looked", 0)
-    monkeypatch.setattr(CountedSearch, "led", 0)
-    return lambda nats: monkeypatch.setattr("aerialdojo_gen.learning.policy.LOST_NATS", nats)
+    return calls
 
 
-@pytest.mark.parametrize("lost", [True, False])
-def test_the_search_leads_where_the_place_is_not_known_and_nowhere_else(smoke, learned, tmp_path, lost_from, lost):
-    lost_from(-1.0 if lost else np.inf)
-    chosen = Selection(("id_train",), limit=4)
-    evaluate(smoke, Evaluation("lost", "policy", {"weights": str(learned)}, chosen), out=tmp_path, workers=1)
-    rows = read_run(tmp_path, "lost").to_pylist()
-    if lost:
-        assert CountedSearch.led == CountedSearch.looked >= len(rows) > 0
-    else:
-        assert (CountedSearch.led, CountedSearch.looked) == (0, 0)
-        assert any(row["n_actions"] > 1 for row in rows)
+def set_lost_from(monkeypatch, nats):
+    """How unsure of its place a policy has to be to search."""
+    monkeypatch.setattr("aerialdojo_gen.learning.policy.LOST_NATS", nats)
 
 
-def test_who_finds_out_late_that_it_is_lost_searches_what_it_saw_before(learned, lost_from):
-    lost_from(np.inf)
+def test_the_search_leads_where_the_place_is_not_known_and_nowhere_else(smoke, learned, tmp_path, calls, monkeypatch):
+    for name, nats in (("known", np.inf), ("lost", -1.0)):
+        assert not calls
+        set_lost_from(monkeypatch, nats)
+        chosen = Selection(("id_train",), limit=4)
+        evaluate(smoke, Evaluation(name, "policy", {"weights": str(learned)}, chosen), out=tmp_path, workers=1)
+    assert any(n > 1 for n in read_run(tmp_path, "known")["n_actions"].to_pylist())
+    assert calls["observe"] == calls["towards"] >= read_run(tmp_path, "lost").num_rows > 0
+
+
+def test_who_finds_out_late_that_it_is_lost_searches_what_it_saw_before(learned, calls, monkeypatch):
+    set_lost_from(monkeypatch, np.inf)
     policy, draw = Policy(str(learned)), np.random.default_rng(0)
     policy.reset(
         Goal("semantic", "red van", "clock tower", "north", "A red van.", None, Rules(90, sensors=policy.sensors))
     )
     for step in range(7):
         if step == 5:
-            assert CountedSearch.looked == 0
-            lost_from(-1.0)
+            assert not calls
+            set_lost_from(monkeypatch, -1.0)
         rgb = {view: draw.integers(0, 256, (32, 32, 3), np.uint8) for view in policy.sensors.views}
         depth_m = {view: draw.uniform(1.0, 20.0, (32, 32)).astype(np.float32) for view in policy.sensors.views}
         assert 0 <= policy.act(Observation(step, 90 - step, rgb=rgb, depth_m=depth_m)) < 16
     # The five of before, and one at each step since.
-    assert CountedSearch.looked == 7
+    assert calls["observe"] == 7
 
 
 def test_a_guess_that_is_led_is_where_it_was_led_to(sightless):
@@ -183,10 +180,6 @@ def test_a_guess_that_is_led_is_where_it_was_led_to(sightless):
         assert not torch.allclose(one, two)
 
 
-def same(a, b):
-    return torch.allclose(a, b, rtol=0.0, atol=1e-5)
-
-
 def guess(network, seen, goal):
     blank = network.blank(len(seen))
     return network.whereabouts(seen[:, None], goal, torch.zeros(len(seen), 1, 4), blank)[0]
@@ -194,7 +187,7 @@ def guess(network, seen, goal):
 
 def test_adapted_weights_begin_as_the_given_ones(learned, adapted):
     """For what both know, the two networks answer alike; what is new stands beside it."""
-    old, new = (checkpoints.read(path)[1] for path in (learned, adapted))
+    old, new = (read_weights(path)[1] for path in (learned, adapted))
     assert old.scenes == ("U_Courtyard_0",)
     assert new.scenes == ("U_Courtyard_0", "U_Courtyard_1")
     n = len(old.vocabulary)
@@ -221,7 +214,7 @@ def test_adapted_weights_begin_as_the_given_ones(learned, adapted):
             (choice.blocked, choice_after.blocked), (words[..., :-1], words_after[..., : len(old.named)]),
             (words[..., -1], words_after[..., -1]),  # the last is of no object
         ):  # fmt: skip
-            assert same(a, b)
+            assert torch.allclose(a, b, rtol=0.0, atol=1e-5)
 
 
 def test_a_training_goes_on_from_where_the_given_weights_are(smoke, cache, learned, tmp_path):
@@ -234,13 +227,13 @@ def test_a_training_goes_on_from_where_the_given_weights_are(smoke, cache, learn
     assert f"begins with {learned}, scenes known: 1, new: 0; words known: " in done.stderr
     first, anew = (next(row for row in history(folder) if row["phase"] == 0) for folder in (out, learned.parent))
     assert first["loss"] < 0.9 * anew["loss"]
-    assert checkpoints.read(out / "policy.safetensors")[1].scenes == ("U_Courtyard_0",)
+    assert read_weights(out / "policy.safetensors")[1].scenes == ("U_Courtyard_0",)
 
 
 def test_what_does_not_fit_is_refused_in_a_line_that_names_it(smoke, cache, learned, tmp_path):
     old = rewritten(learned, tmp_path / "old.safetensors", scenes=())
     cut = rewritten(learned, tmp_path / "cut.safetensors", lacking="choice")
-    named = checkpoints.read(learned)[1].named
+    named = read_weights(learned)[1].named
     wordless = rewritten(learned, tmp_path / "wordless.safetensors", named=named[:-1])
     for init, changed, error, message in (
         (learned, {"model": {"hidden": 48}}, UsageError, r"its \[model\] hidden is 32, and the recipe's is 48"),

@@ -9,11 +9,11 @@ from aerialdojo_gen.benchmark.agents.goal import Sensors
 from aerialdojo_gen.benchmark.flight import nodes_of
 from aerialdojo_gen.benchmark.observations import renderer_for
 from aerialdojo_gen.benchmark.tasks import Selection, mesh_of
-from aerialdojo_gen.dataset.episode import Episode
 from aerialdojo_gen.geometry.cameras import view_pose
-from aerialdojo_gen.learning.exploration_views import NOTHING, UNNAMED, collect_views, patch_labels
+from aerialdojo_gen.learning import parts
 from aerialdojo_gen.learning.index import read_index
-from aerialdojo_gen.learning.parts import Exploration, Part, pictures
+from aerialdojo_gen.learning.labels import blocked_at
+from aerialdojo_gen.learning.parts import NOTHING, UNNAMED
 from aerialdojo_gen.learning.search import Search, patch_depths_m, patch_rays
 from aerialdojo_gen.learning.words import name_vocabulary, word_targets
 from aerialdojo_gen.planning.flight_space import flight_space
@@ -35,8 +35,8 @@ def looks(smoke, tmp_path_factory):
     """Looks about in the smoke run's scene, with what they show."""
     root = open_root(smoke)
     (scene, *_) = read_index(root, Selection(("id_train",))).scenes
-    part = Part(root, ("id_train",), (), scene, (), SENSORS, 32, "gl", tmp_path_factory.mktemp("looks"))
-    return part, collect_views(part, Exploration(60, 3, 0, "train"))
+    part = parts.Part(root, ("id_train",), (), SENSORS, "gl", tmp_path_factory.mktemp("looks"), scene=scene)
+    return part, parts.collect_views(part, parts.Exploration(60, 3, 0, "train"))
 
 
 def seeing(shown, number):
@@ -60,7 +60,7 @@ def test_a_patch_shows_what_most_of_its_pixels_do(seed, blocky):
     # Blocks of any size: patches of one object, of several, and of few pixels of one.
     small = rng.integers(-2, 4, (2, 16 // blocky + 1, 16 // blocky + 1)).astype(np.int16)
     number = small.repeat(blocky, axis=1).repeat(blocky, axis=2)[:, :16, :16]
-    for k, found in enumerate(patch_labels(number).tolist()):
+    for k, found in enumerate(parts.patch_labels(number).tolist()):
         view, row, column = np.unravel_index(k, (2, 4, 4))
         own = number[view, 4 * row : 4 * row + 4, 4 * column : 4 * column + 4].ravel().tolist()
         count = {one: own.count(one) for one in set(own) - {NOTHING}}
@@ -109,19 +109,16 @@ def test_looks_about_are_taken_near_where_references_lead_and_turned_at_random(l
     apart = np.linalg.norm(found.pose[:, None, :3] - places[None], axis=2).min(axis=1)
     assert 0.2 < np.median(apart) < apart.max() <= 3.0
     space = flight_space(*mesh_of(part.data, part.scene), 0.25)
-    for pose, blocked_at in zip(found.pose.astype(np.float64), found.blocked, strict=True):
+    for pose in found.pose.astype(np.float64):
         # A look may be at a contact: single precision moves it by some micrometres.
         assert space.grid.distance_m(pose[:3]) > 0.25 - 0.01
-        for action in range(16):
-            episode = Episode(space, tuple(pose), (0.0, 0.0, 0.0), 9)
-            episode.step(action)
-            assert blocked_at[action] == (episode.refused or episode.termination == "collision"), (pose, action)
+    assert (found.blocked == blocked_at(space, found.pose)).all()
     assert set(found.scene) == {part.scene}
     assert (found.first == np.arange(61)).all()
     # All four quarters, each by more than a tenth.
     assert np.bincount(((found.pose[:, 3] + np.pi) // (np.pi / 2)).astype(int), minlength=4).min() > 6
     # Poses are kept in single precision: an edge may fall on the other side of a pixel's middle.
-    assert (pictures(part, found.pose[:5].astype(np.float64)) == found.frames[:5]).mean() > 0.99
+    assert (parts.pictures(part, found.pose[:5].astype(np.float64)) == found.frames[:5]).mean() > 0.99
     assert len(np.unique(found.frames.reshape(60, -1), axis=0)) > 50
 
 

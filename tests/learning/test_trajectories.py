@@ -1,4 +1,7 @@
-"""The data set: its pictures are the renderer's, its labels fly to the goal, its windows are the trajectory's."""
+"""The data set: its pictures are the renderer's, its labels fly to the goal, its windows are the trajectory's.
+
+Over one data directory, over several, and over worlds from seeds that are made for it.
+"""
 
 import shutil
 from itertools import product
@@ -13,18 +16,19 @@ from aerialdojo_gen.base.errors import StoreError, UsageError
 from aerialdojo_gen.benchmark.agents.goal import N_ACTIONS
 from aerialdojo_gen.benchmark.env import AerialDojoEnv
 from aerialdojo_gen.benchmark.tasks import mesh_of
+from aerialdojo_gen.benchmark.worlds import make_worlds
+from aerialdojo_gen.dataset.contents import prune_release
 from aerialdojo_gen.dataset.episode import Episode
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.geometry.motion import replay
 from aerialdojo_gen.learning import Trajectories, Vocabulary, collate
 from aerialdojo_gen.learning.labels import NO_ACTION
-from aerialdojo_gen.learning.pictures import CachedFrames
 from aerialdojo_gen.planning.flight_space import flight_space
 from aerialdojo_gen.store.root import open_root
 
 VIEWS = ("front", "down", "left")
-
-
+STEPS = ("rgb", "depth_m", "action", "previous_action", "remaining_actions", "odometry", "pose")
+HOW = {"views": ("front",), "size": (24, 16), "goal": ("text", "image"), "privileged": ("pose", "goal_distance_m")}
 SEEN = {"split": "all", "views": VIEWS, "size": (40, 24), "limit": 6, "privileged": "pose"}
 
 
@@ -74,7 +78,7 @@ def test_labels_fly_every_trajectory_to_its_goal(smoke, blind):
     assert len(blind) == len(index.actions)
     for k in range(0, len(index), 12):
         batch = blind.batch(range(blind._first[k], blind._first[k + 1]))
-        space = flight_space(*mesh_of(root, index.scene_of(k)[1]), 0.25)
+        space = flight_space(*mesh_of(root, index.sources[k][1]), 0.25)
         episode = Episode(space, tuple(index.start[k]), tuple(index.goal[k]), int(index.budget[k]))
         left = batch["goal_distance_m"][:, 0]
         for i, action in enumerate(batch["action"][:, 0]):
@@ -90,7 +94,7 @@ def test_labels_fly_every_trajectory_to_its_goal(smoke, blind):
         # The distance left falls by no more than what is flown.
         assert left[-1] <= 3.0
         assert (np.diff(left) <= 5.3).all()
-        reckoned = replay([0.0, 0.0, 0.0, 0.0], index.actions_of(k)[:-1])
+        reckoned = replay([0.0, 0.0, 0.0, 0.0], index.routes[k][:-1])
         told = batch["odometry"][:, 0]
         assert told[:, :3] == pytest.approx(reckoned[:, :3], abs=1e-4)
         assert np.cos(told[:, 3] - reckoned[:, 3]) == pytest.approx(1.0, abs=1e-6)
@@ -100,7 +104,7 @@ def test_privileged_columns_are_what_the_environment_does(smoke, blind):
     root, blocked = open_root(smoke), 0
     for number in np.random.default_rng(0).choice(len(blind), 60, replace=False).tolist():
         sample, k = blind[number], blind.place(number)[0]
-        space = flight_space(*mesh_of(root, blind.index.scene_of(k)[1]), 0.25)
+        space = flight_space(*mesh_of(root, blind.index.sources[k][1]), 0.25)
         for action in range(N_ACTIONS):
             episode = Episode(space, tuple(sample["pose"][0]), tuple(blind.index.goal[k]), 5)
             episode.step(action)
@@ -123,12 +127,10 @@ def test_windows_look_back_and_hold_nothing_before_the_start(smoke, seen):
         assert window["mask"].tolist() == [step - 3 + i >= 0 for i in range(4)]
         for i in range(4):
             if not window["mask"][i]:
-                assert not window["rgb"][i].any()
-                assert not window["depth_m"][i].any()
+                assert not any(window[name][i].any() for name in STEPS)
                 continue
             alone = seen[number - 3 + i]
-            for name in ("rgb", "depth_m", "action", "previous_action", "remaining_actions", "odometry", "pose"):
-                assert (window[name][i] == alone[name][0]).all(), name
+            assert all((window[name][i] == alone[name][0]).all() for name in STEPS)
         first = int(window["mask"].argmax())
         assert (window["previous_action"][first] == NO_ACTION) == (step <= 3)
 
@@ -199,7 +201,7 @@ def test_a_batch_without_a_goal_picture_is_the_same_whenever_it_comes(planted):
         assert not batch["image"][0].any()
 
 
-def test_the_cache_gives_what_was_drawn_and_survives_damage(smoke, seen, tmp_path):
+def test_the_cache_gives_what_was_drawn_survives_damage_and_stays_within_its_bound(smoke, seen, tmp_path):
     kept = Trajectories(smoke, **SEEN, cache_gb=1, cache_dir=tmp_path)
     assert kept.fingerprint == seen.fingerprint
     numbers = list(range(0, len(seen), 5))
@@ -218,17 +220,14 @@ def test_the_cache_gives_what_was_drawn_and_survives_damage(smoke, seen, tmp_pat
         for batch in (first, again):
             assert (batch[name] == plain[name]).all()
         assert (mended[name][numbers] == plain[name]).all()
-
-
-def test_the_cache_stays_within_its_bound(smoke, seen, tmp_path):
-    size = 300_000
-    kept = Trajectories(smoke, **SEEN, cache_gb=size / 1e9, cache_dir=tmp_path)
-    assert isinstance(kept._source, CachedFrames)
+    # Within its bound, whatever finds no room is drawn.
+    size, folder = 300_000, tmp_path / "small"
+    few = Trajectories(smoke, **SEEN, cache_gb=size / 1e9, cache_dir=folder)
     for _ in range(2):
-        assert (kept.batch(range(len(kept)))["rgb"] == seen.batch(range(len(seen)))["rgb"]).all()
-    files = list(tmp_path.glob("*/*/*.pix"))
-    assert 0 < len(files) < 6
-    assert sum(path.stat().st_size for path in files) <= size
+        assert (few.batch(numbers)["rgb"] == plain["rgb"]).all()
+    sizes = [path.stat().st_size for path in folder.glob("*/*/*.pix")]
+    assert 0 < len(sizes) < 6
+    assert sum(sizes) <= size
 
 
 def test_recordings_are_read_where_they_are(smoke):
@@ -252,29 +251,25 @@ def test_recordings_are_read_where_they_are(smoke):
     assert all((mixed["rgb"][2 + k] == drawn[k]["rgb"]).all() for k in other)
 
 
-def test_without_recordings_it_says_what_makes_them(planted):
+def test_a_release_without_recordings_or_without_meshes_is_named(planted):
+    meshes = (planted.data / "meshes").rename(planted.data / "elsewhere")
+    with pytest.raises(StoreError, match=r"the mesh .*U_Courtyard_0.*is missing: run aerialdojo-gen build-scenes"):
+        Trajectories(planted.data, split="all")
+    assert len(Trajectories(planted.data, split="all", views=())) > 0, "who sees nothing needs none"
+    meshes.rename(planted.data / "meshes")
     with pytest.raises(UsageError, match="aerialdojo-gen render"):
         Trajectories(planted.data, split="all", source="recordings")
 
 
-def test_a_release_without_meshes_is_named(planted):
-    shutil.rmtree(planted.data / "meshes")
-    with pytest.raises(StoreError, match=r"the mesh .*U_Courtyard_0.*is missing: run aerialdojo-gen build-scenes"):
-        Trajectories(planted.data, split="all")
-    assert len(Trajectories(planted.data, split="all", views=())) > 0, "who sees nothing needs none"
-
-
-def test_the_split_by_objects_is_kept_to(smoke):
+def test_a_selection_keeps_to_the_split_by_objects_and_to_its_limit(smoke):
     sides = {side: Trajectories(smoke, split="all", views=(), target_split=side) for side in ("train", "test")}
     tasks = open_release(smoke).tasks().to_pandas().drop_duplicates("nav_id").set_index("nav_id")["target_split"]
     assert all(set(tasks[data.index.nav_id]) == {side} for side, data in sides.items())
     assert sum(len(d.index) for d in sides.values()) == len(tasks)
-
-
-def test_a_limit_spreads_over_scenes_and_only_adds(smoke):
+    assert sides["train"].fingerprint != sides["test"].fingerprint
     few, more = (Trajectories(smoke, split="all", views=(), limit=limit).index for limit in (4, 7))
     assert set(few.nav_id) < set(more.nav_id)
-    assert np.bincount(few.scene).tolist() == [2, 2]
+    assert np.bincount(few.scene).tolist() == [2, 2], "spread over the scenes"
 
 
 @pytest.mark.parametrize(
@@ -289,11 +284,17 @@ def test_a_limit_spreads_over_scenes_and_only_adds(smoke):
         ({"size": 0}, "no camera has 0"),
         ({"past": -1}, "at least 0"),
         ({"limit": 0}, "a limit is at least 1"),
+        ({"release": None}, "either a release or worlds"),
+        ({"worlds": "N_*"}, "either a release or worlds"),
+        ({"num_worlds": 2}, "num_worlds: of worlds, not of a release"),
+        ({"release": []}, "at least one data directory"),
+        ({"release": None, "worlds": "N_Nowhere"}, "N_Nowhere"),
+        ({"release": None, "worlds": "N_Snowfield", "num_worlds": 0}, "at least 1 world"),
     ],
 )
 def test_what_makes_no_sense_is_named(smoke, options, message):
     with pytest.raises(UsageError, match=message):
-        Trajectories(smoke, **{"split": "all", **options})
+        Trajectories(**{"release": smoke, "split": "all", **options})
 
 
 def test_a_number_beyond_the_samples_is_an_index_error(blind):
@@ -302,6 +303,62 @@ def test_a_number_beyond_the_samples_is_an_index_error(blind):
     assert blind[-1]["nav_id"] == blind.index.nav_id[-1]
 
 
-def test_the_fingerprint_is_the_selections(smoke):
-    one, again, other = (Trajectories(smoke, split=split, views=()) for split in ("id_train", "id_train", "id_test"))
-    assert one.fingerprint == again.fingerprint != other.fingerprint
+def alike(a, b):
+    return a.keys() == b.keys() and all(np.array_equal(a[name], b[name]) for name in a)
+
+
+@pytest.fixture(scope="module")
+def halves(smoke, tmp_path_factory):
+    """The smoke run's two scenes, a data directory each, the last one first."""
+    found = [tmp_path_factory.mktemp("halves") / scene for scene in ("U_Courtyard_1", "U_Courtyard_0")]
+    for half in found:
+        for part in ("release", "meshes"):
+            shutil.copytree(smoke / part, half / part)
+        prune_release(half, [half.name])
+    return found
+
+
+def test_two_directories_are_read_as_the_one_that_has_both(smoke, halves):
+    whole, parts = (Trajectories(data, "all", limit=6, **HOW) for data in (smoke, halves))
+    assert parts.index.scenes == ("U_Courtyard_0", "U_Courtyard_1")
+    assert [root.url for root in parts.index.roots.values()] == [str(path) for path in reversed(halves)]
+    assert parts.fingerprint == whole.fingerprint
+    assert len(parts) == len(whole) > 0
+    numbers = range(0, len(whole), max(1, len(whole) // 12))
+    assert {nav_id[:13] for nav_id in whole.batch(numbers)["nav_id"]} == {"U_Courtyard_0", "U_Courtyard_1"}
+    batch = parts.batch(numbers)
+    assert alike(batch, whole.batch(numbers))
+    assert batch["rgb"].std() > 10
+
+
+def test_a_directory_in_which_nothing_fits_is_left_out_and_a_scene_in_two_refused(smoke, halves):
+    own = Trajectories(halves, "id_train", views=())
+    assert own.index.scenes == ("U_Courtyard_0",)
+    assert own.fingerprint == Trajectories(halves[1], "id_train", views=()).fingerprint
+    with pytest.raises(UsageError, match="no scene 'U_Nowhere_0'"):
+        Trajectories(halves, scene="U_Nowhere_0")
+    with pytest.raises(UsageError, match=r"scene U_Courtyard_0 is in .* and in .*: name one"):
+        Trajectories([smoke, halves[1]], "all", views=())
+
+
+@pytest.mark.slow
+def test_worlds_are_made_once_and_read_as_one(worlds_cache):
+    asked = {"worlds": "U_Alley", "num_worlds": 2, "n_objects": 6, "worlds_cache": worlds_cache}
+    data = Trajectories(**asked, setting="base", **HOW)
+    names = ("U_Alley-1000", "U_Alley-1001")
+    assert data.index.scenes == names
+    made = {path: path.stat().st_mtime_ns for path in worlds_cache.glob("*/*/data/release/**/*.parquet")}
+    folders = make_worlds("U_Alley", num_worlds=2, n_objects=6, folder=worlds_cache)
+    assert [root.url for root in data.index.roots.values()] == [str(folder) for folder in folders]
+    assert sorted(k for numbers in data.order(8, seed=2) for k in numbers) == [*range(len(data))]
+    batch = data.batch(np.linspace(0, len(data) - 1, 8).astype(int))
+    assert {nav_id.rpartition("-")[0] for nav_id in batch["nav_id"]} == set(names)
+    assert batch["rgb"].reshape(8, -1).std(axis=1).min() > 1
+    assert np.isfinite(batch["goal_distance_m"]).all()
+    for name, folder in zip(names, folders, strict=True):
+        alone = Trajectories(folder, setting="base", vocabulary=data.vocabulary, **HOW)
+        own = [k for k in range(len(data)) if data.index.sources[data.place(k)[0]][1] == name]
+        assert len(own) == len(alone)
+        assert alike(data.batch(own[:5]), alone.batch(range(5)))
+    assert Trajectories(**asked, setting="base", **HOW).fingerprint == data.fingerprint
+    assert {path: path.stat().st_mtime_ns for path in made} == made

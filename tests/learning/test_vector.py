@@ -9,7 +9,7 @@ from gymnasium.utils.env_checker import check_env
 
 from aerialdojo_gen import make_env, open_release
 from aerialdojo_gen.base.errors import UsageError
-from aerialdojo_gen.learning.vector import OwnScenes, ProgressReward, make_vec
+from aerialdojo_gen.learning.vector import Flattened, OwnScenes, ProgressReward, make_vec
 
 
 class Blindfold(gymnasium.ObservationWrapper):
@@ -23,17 +23,9 @@ class Blindfold(gymnasium.ObservationWrapper):
         return {"step": observation["step"]}
 
 
-def scene_of(task_id):
-    return task_id.rsplit("-", 2)[0]
-
-
-def references(smoke, n):
-    return open_release(smoke).routes(scene="U_Courtyard_0").slice(0, n).to_pylist()
-
-
 def test_progress_adds_up_to_the_distance_flown_nearer(smoke):
     env = ProgressReward(make_env(smoke, views=()), scale=0.5, action_cost=0.25)
-    for row in references(smoke, 5):
+    for row in open_release(smoke).routes(scene="U_Courtyard_0").slice(0, 5).to_pylist():
         _, info = env.reset(options={"task_id": f"{row['nav_id']}-s"})
         start, total = info["goal_distance_m"], 0.0
         assert row["euclidean_m"] - 1e-6 <= start <= row["length_m"] * 1.02 + 0.5
@@ -44,15 +36,11 @@ def test_progress_adds_up_to_the_distance_flown_nearer(smoke):
         assert info["goal_distance_m"] <= 3.0
         expected = 1.0 + 0.5 * (start - info["goal_distance_m"]) - 0.25 * len(row["agent_action"])
         assert total == pytest.approx(expected, abs=1e-6)
-
-
-def test_turning_on_the_spot_gains_nothing_and_a_detour_gains_nothing_in_the_end(smoke):
+    # Turning on the spot gains nothing, and a detour gains nothing in the end.
     env = ProgressReward(make_env(smoke, views=()))
-    row = references(smoke, 1)[0]
     env.reset(options={"task_id": f"{row['nav_id']}-s"})
     assert [env.step(14)[1], env.step(15)[1]] == [0.0, 0.0]
-    there, back = env.step(10)[1], env.step(12)[1]
-    assert there + back == pytest.approx(0.0, abs=1e-9)
+    assert env.step(10)[1] + env.step(12)[1] == pytest.approx(0.0, abs=1e-9)
 
 
 def test_a_collision_costs(smoke):
@@ -68,11 +56,12 @@ def test_a_collision_costs(smoke):
 
 
 def test_gymnasiums_checker_finds_nothing_in_the_wrappers(smoke):
-    env = ProgressReward(OwnScenes(make_env(smoke, views=("front",), width=16, height=16), ["U_Courtyard_0"]))
+    env = ProgressReward(OwnScenes(make_env(smoke, views=("front", "down"), width=16, height=16), ["U_Courtyard_0"]))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         warnings.filterwarnings("ignore", message=".*not.*unwrapped|.*spec.*|.*render_modes.*|.*is different from.*")
-        check_env(env, skip_render_check=True)
+        for one in (env, Flattened(env)):
+            check_env(one, skip_render_check=True)
 
 
 def test_stable_baselines_checker_takes_what_it_can_take(smoke):
@@ -80,8 +69,6 @@ def test_stable_baselines_checker_takes_what_it_can_take(smoke):
     checker = pytest.importorskip(
         "stable_baselines3.common.env_checker", reason="stable-baselines3 is not installed: tried where it is"
     )
-    from aerialdojo_gen.learning.vector import Flattened
-
     env = Flattened(ProgressReward(make_env(smoke, views=("front", "down"), width=48, height=48)))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -117,7 +104,7 @@ def test_more_environments_than_scenes_and_ones_own_wrappers(smoke):
     envs = make_vec(smoke, 5, vectorization_mode="sync", views=(), wrappers=[Blindfold])
     observation, _ = envs.reset(seed=0)
     assert set(observation) == {"step"}
-    assert {scene_of(env.unwrapped.task.row["task_id"]) for env in envs.envs} == set(make_env(smoke, views=()).scenes)
+    assert {env.unwrapped.task.row["scene"] for env in envs.envs} == set(make_env(smoke, views=()).scenes)
 
 
 @pytest.mark.parametrize(
@@ -132,8 +119,5 @@ def test_more_environments_than_scenes_and_ones_own_wrappers(smoke):
 def test_what_makes_no_sense_is_named(smoke, options, message):
     with pytest.raises(UsageError, match=message):
         make_vec(smoke, **options)
-
-
-def test_scenes_without_tasks_are_named(smoke):
     with pytest.raises(UsageError, match="no task of the selection is in U_Mall_0"):
         OwnScenes(make_env(smoke, views=()), ["U_Mall_0"])

@@ -10,15 +10,8 @@ from aerialdojo_gen.learning.encoding import DeadReckoning
 
 torch = pytest.importorskip("torch", reason="PyTorch is not installed: it is the extra 'train'")
 
-from aerialdojo_gen.learning.localization import (  # noqa: E402
-    UNIT_M,
-    Localization,
-    LocalizationOutput,
-    directions,
-    offset_loss,
-    places,
-)
-from aerialdojo_gen.learning.network import Network, PolicyOutput, Shape  # noqa: E402 - it needs torch
+from aerialdojo_gen.learning import network as networks  # noqa: E402 - it needs torch
+from aerialdojo_gen.learning.network import UNIT_M, Localization, LocalizationOutput  # noqa: E402
 
 T, SCENES = 9, 3
 START, GOAL = np.array([31.0, -12.0, 6.0, 2.3]), np.array([-8.0, 20.0, 9.0])
@@ -40,17 +33,6 @@ def flight():
         name: torch.from_numpy(np.asarray(value, np.float32)[None])
         for name, value in {"pose": poses, "odometry": moved, "offset": offset}.items()
     } | {"mask": torch.ones((1, T), dtype=torch.bool), "scene": torch.tensor([1])}
-
-
-class Known(torch.nn.Module):
-    """In the place of a layer: what it would say."""
-
-    def __init__(self, said):
-        super().__init__()
-        self.said = said
-
-    def forward(self, _):
-        return self.said
 
 
 def told(value, centres, width):
@@ -76,17 +58,16 @@ def scene_logits(number=1):
     return torch.nn.functional.one_hot(torch.full((1, T), number), SCENES) * 20.0
 
 
-def guessing(place, yaw, goal, trust):
-    """Make whereabouts that guess this at every step."""
+def error_m(flight, place, yaw, goal, trust):
+    """How far off the goal is of whereabouts that guess this at every step."""
     made = Localization(4, 4, 4, SCENES)
-    made.body = Known(torch.cat([place_logits(place), heading_logits(yaw), scene_logits(), trust], dim=-1))
-    made.target = Known(place_logits(goal))
-    return made
-
-
-def asked(whereabouts, flight):
-    blank = torch.zeros(1, whereabouts.sums)
-    return whereabouts(torch.zeros(1, T, 4), torch.zeros(1, 4), flight["odometry"], blank)[0]
+    body = torch.cat([place_logits(place), heading_logits(yaw), scene_logits(), trust], dim=-1)
+    # In the place of layers: what they would say.
+    for name, value in (("body", body), ("target", place_logits(goal))):
+        delattr(made, name)
+        setattr(made, name, lambda _, value=value: value)
+    guess, _ = made(torch.zeros(1, T, 4), torch.zeros(1, 4), flight["odometry"], torch.zeros(1, made.sums))
+    return torch.linalg.vector_norm(guess.offset * UNIT_M - flight["offset"], dim=-1)
 
 
 def truth(flight):
@@ -94,24 +75,20 @@ def truth(flight):
     return flight["pose"][..., :3].clone(), flight["pose"][..., 3].clone(), goal
 
 
-def error_m(guess, flight):
-    return torch.linalg.vector_norm(guess.offset * UNIT_M - flight["offset"], dim=-1)
-
-
 def test_what_intervals_tell_is_a_place_and_a_direction():
     draw = torch.Generator().manual_seed(2)
     wide = torch.tensor([120.0, 120.0, 20.0])
     place = (torch.rand(200, 3, generator=draw) * 2.0 - 1.0) * wide
-    found, spread = places(place_logits(place))
+    found, spread = networks.places(place_logits(place))
     assert torch.allclose(found, place, atol=1e-3)
     # Of two intervals at most half of one; who has no idea is a quarter of all intervals off, and more.
     assert float((spread / torch.tensor([4.0, 4.0, 2.0])).max()) <= 0.5 + 1e-3
-    assert bool((places(torch.zeros(5, 164))[1] > torch.tensor([70.0, 70.0, 20.0])).all())
+    assert bool((networks.places(torch.zeros(5, 164))[1] > torch.tensor([70.0, 70.0, 20.0])).all())
     yaw = (torch.rand(200, generator=draw) * 2.0 - 1.0) * np.pi
-    found = directions(heading_logits(yaw))
+    found = networks.directions(heading_logits(yaw))
     length = torch.linalg.vector_norm(found, dim=-1)
     assert float(length.min()) > 10.0
-    assert float(directions(torch.zeros(1, 24)).abs().max()) < 1e-5
+    assert float(networks.directions(torch.zeros(1, 24)).abs().max()) < 1e-5
     turned = torch.atan2(found[:, 1], found[:, 0]) - yaw
     assert float((torch.remainder(turned + np.pi, 2 * np.pi) - np.pi).abs().max()) < np.deg2rad(0.1)
 
@@ -120,14 +97,14 @@ def test_right_guesses_say_where_the_goal_is_and_one_sure_look_is_remembered(fli
     """What is wildly wrong and unsure afterwards does not matter: own motion carries the one good look on."""
     place, yaw, goal = truth(flight)
     trust = torch.randn(1, T, 1, generator=torch.Generator().manual_seed(1))
-    assert float(error_m(asked(guessing(place, yaw, goal, trust), flight), flight).max()) < 0.1
+    assert float(error_m(flight, place, yaw, goal, trust).max()) < 0.1
     place[:, 1:] += 40.0
     yaw[:, 1:] = 1.0
     sure = torch.full((1, T, 1), -20.0)
     sure[:, 0] = 50.0
-    assert float(error_m(asked(guessing(place, yaw, goal, sure), flight), flight).max()) < 0.2
+    assert float(error_m(flight, place, yaw, goal, sure).max()) < 0.2
     # The same looks, all trusted alike, are far off.
-    assert float(error_m(asked(guessing(place, yaw, goal, 0.0 * sure), flight), flight)[0, -1]) > 10.0
+    assert float(error_m(flight, place, yaw, goal, 0.0 * sure)[0, -1]) > 10.0
 
 
 def test_the_loss_falls_only_where_each_guess_is_right(flight):
@@ -136,19 +113,21 @@ def test_the_loss_falls_only_where_each_guess_is_right(flight):
     right = LocalizationOutput(
         flight["offset"] / UNIT_M, place_logits(place), heading_logits(yaw), scene_logits(), place_logits(goal),
     )  # fmt: skip
-    least = float(offset_loss(right, flight))
-    assert float(offset_loss(right._replace(offset=right.offset + 0.5), flight)) == pytest.approx(least + 0.125)
+    least = float(networks.offset_loss(right, flight))
+    assert float(networks.offset_loss(right._replace(offset=right.offset + 0.5), flight)) == pytest.approx(
+        least + 0.125
+    )
     for wrong in (
         {"place": place_logits(place + 3.0)}, {"goal": place_logits(goal - 3.0)},
         {"heading": heading_logits(yaw + 0.5)}, {"scene": scene_logits(2)},
     ):  # fmt: skip
-        assert float(offset_loss(right._replace(**wrong), flight)) > least + 1.0
+        assert float(networks.offset_loss(right._replace(**wrong), flight)) > least + 1.0
 
 
 @pytest.fixture(scope="module")
 def episode():
     torch.manual_seed(0)
-    network = Network(Shape(50, 1, 32, 2, (8, 8, 8), 16, 8, 24)).eval()
+    network = networks.Network(networks.Shape(50, 1, 32, 2, (8, 8, 8), 16, 8, 24)).eval()
     draw = torch.Generator().manual_seed(5)
     given = {
         "pictures": torch.randint(0, 256, (2 * T, 1, 32, 32, 4), dtype=torch.uint8, generator=draw),
@@ -207,7 +186,7 @@ def test_of_likely_actions_it_takes_one_that_is_free_and_leads_on(logits, blocke
         return out
 
     estimate = LocalizationOutput(torch.tensor([[[0.6, 0.0, -0.8]]]) * away_m / UNIT_M, *[None] * 4)
-    output = PolicyOutput(row({1: 4.0, 2: 3.9} | logits, 0.0), row(blocked, -20.0), estimate)
+    output = networks.PolicyOutput(row({1: 4.0, 2: 3.9} | logits, 0.0), row(blocked, -20.0), estimate)
     assert output.actions(row(dict.fromkeys(back, True), False, torch.bool)).item() == chosen
 
 

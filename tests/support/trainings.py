@@ -31,20 +31,18 @@ def train_here(data: Any, recipe: Recipe, out: Path, cache: Path, **options: Any
 
 def network(policy: Path) -> Any:
     """The network of a policy's weights."""
-    from aerialdojo_gen.learning import checkpoints
-    from aerialdojo_gen.learning.policy import network_of
+    from aerialdojo_gen.learning.policy import read_network
 
-    tensors, about, _ = checkpoints.read(policy)
-    return network_of(about, tensors, str(policy)).eval()
+    return read_network(policy)[0].eval()
 
 
 def rewritten(policy: Path, path: Path, lacking: str | None = None, **said: Any) -> Path:
     """Write weights elsewhere, without tensors of some name, or with something else said of them."""
-    from aerialdojo_gen.learning import checkpoints
+    from aerialdojo_gen.learning.policy import read_weights, write_weights
 
-    tensors, about, state = checkpoints.read(policy)
+    tensors, about, state = read_weights(policy)
     tensors = {name: tensor for name, tensor in tensors.items() if not (lacking and lacking in name)}
-    checkpoints.write(path, tensors, dataclasses.replace(about, **said), state)
+    write_weights(path, tensors, dataclasses.replace(about, **said), state)
     return path
 
 
@@ -69,9 +67,9 @@ def assert_same_training(one, two):
     """Two policies have the same weights to the bit, and came by them through the same losses."""
     import torch
 
-    from aerialdojo_gen.learning import checkpoints
+    from aerialdojo_gen.learning.policy import read_weights
 
-    first, second = (checkpoints.read(path)[0] for path in (one, two))
+    first, second = (read_weights(path)[0] for path in (one, two))
     assert first.keys() == second.keys()
     assert all(torch.equal(first[name], second[name]) for name in first)
     losses = [[row["loss"] for row in history(path.parent)] for path in (one, two)]
