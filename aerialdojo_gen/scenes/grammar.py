@@ -17,7 +17,8 @@ from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.base.kernels import njit
 from aerialdojo_gen.base.simplex import OpenSimplex
-from aerialdojo_gen.geometry.portable import Floats, unit
+from aerialdojo_gen.geometry.arrays import Floats
+from aerialdojo_gen.geometry.portable import unit
 from aerialdojo_gen.scenes.ground import polygons_of
 from aerialdojo_gen.scenes.mesh import Mesh, Parts, by_material, merge, posed, rotation, translated
 from aerialdojo_gen.scenes.shapes import box, extrude, sweep

@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 from support.releases import copy_release, files_of, released, replace_rows
 
 from aerialdojo_gen.base.errors import AssetError, StoreError, UsageError
-from aerialdojo_gen.dataset.contents import existing_scenes, scenes_in_release
+from aerialdojo_gen.dataset.contents import scenes_in_release
 from aerialdojo_gen.exchange import exporting
 from aerialdojo_gen.exchange.exporting import estimate_size, export_release
 from aerialdojo_gen.pipeline.progress import Reporter

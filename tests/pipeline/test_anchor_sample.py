@@ -23,8 +23,7 @@ from aerialdojo_gen.pipeline.stages.work import anchor_sample
 from aerialdojo_gen.pipeline.stages.work.anchor_choice import is_same
 from aerialdojo_gen.pipeline.stages.work.anchor_pictures import fitting_m
 from aerialdojo_gen.pipeline.stages.work.anchor_sample import World, anchors_of
-from aerialdojo_gen.scenes.anatomy import Anatomy, Run
-from aerialdojo_gen.scenes.model import Instance
+from aerialdojo_gen.scenes.model import Anatomy, Instance, Run
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store.tables import check_table
 

@@ -1,7 +1,5 @@
 """The texts of the stage `describe` and of the release that they go into."""
 
-import json
-
 import pytest
 
 from aerialdojo_gen.annotations.claims import SceneClaims, claims_from_json
