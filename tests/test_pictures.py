@@ -12,7 +12,7 @@ from aerialdojo_gen.base.pictures import (
     FRAME_PNG,
     REFERENCE_PNG,
     TEXTURE_PNG,
-    data_url,
+    Picture,
     decode_as_stored,
     decode_grey,
     decode_rgb,
@@ -72,8 +72,8 @@ def test_what_is_decoded_is_what_was_encoded():
     red = np.zeros((16, 16, 3), np.uint8)
     red[..., 0] = 255
     assert np.abs(decode_rgb(encode_jpeg(red, 90)).astype(int) - red).max() < 8
-    assert data_url(encode_png(red)).startswith("data:image/png;base64,iVBOR")
-    assert data_url(encode_jpeg(red, 90)).startswith("data:image/jpeg;base64,/9j/")
+    assert Picture(encode_png(red)).data_url.startswith("data:image/png;base64,iVBOR")
+    assert Picture(encode_jpeg(red, 90)).data_url.startswith("data:image/jpeg;base64,/9j/")
 
 
 @pytest.mark.parametrize("file", [None, b"", b"no picture", encode_png(noise(9, 7, 3))[:40]])
