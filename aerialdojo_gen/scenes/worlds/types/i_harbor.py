@@ -44,7 +44,7 @@ class _Port:
         return [list(self.at(*p)) for p in points]
 
     def slot(self, kind: str, x: float, y: float, yaw_deg: float, room_m: Point, on: str | None = None) -> None:
-        """Offer a place where the ground is free."""
+        """Offer a place to what fits there."""
         self.draft.slot(kind, *self.at(x, y), self.yaw(yaw_deg), room_m, on=on)
 
     def quays(self, boxes: Sequence[tuple[float, float, float, float]]) -> None:
