@@ -10,12 +10,7 @@ from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
-from aerialdojo_gen.annotations.draft import (
-    MAX_PER_CATEGORY,
-    SCENERY,
-    AnnotationDrafter,
-    DraftOptions,
-)
+from aerialdojo_gen.annotations.draft import MAX_PER_CATEGORY, SCENERY, AnnotationDrafter, DraftOptions
 from aerialdojo_gen.annotations.format import Annotations, write_annotations
 from aerialdojo_gen.annotations.landmarks import choose_landmarks
 from aerialdojo_gen.annotations.vocabulary import Vocabulary
