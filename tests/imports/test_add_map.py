@@ -106,6 +106,13 @@ def test_things_of_the_map_are_the_catalogues_and_what_is_in_a_building_is_not(t
     assert cars
     road = shapely.union_all([shapely.box(-60, -3.3, 60, 3.3), shapely.box(-6, -60, 6, 4)])
     assert all(road.contains(Point(c.centroid[:2])) for c in cars)
+    rows = [row for entry in maps.plan_of(town)["site"] for row in entry.get("place", ()) if isinstance(row, list)]
+    driving = [(y, yaw) for _, x, y, yaw in rows if abs(y) < 3.2 and abs(x) > 8.0]
+    assert len(driving) >= 2
+    assert all(yaw == (0.0 if y < 0.0 else 180.0) for y, yaw in driving)
+    # Lamps look at their street, and all are of one kind.
+    lamps = {(what, y, yaw) for what, _, y, yaw in rows if what.startswith("street_lamp") and abs(y) < 4.0}
+    assert lamps == {("street_lamp:single", 3.7, 270.0)}
 
 
 def test_nobody_is_in_a_building_and_everybody_may_be_in_the_street(town):
