@@ -21,6 +21,7 @@ from aerialdojo_gen.scenes.kit.buildings import before_walls, oriented_rectangle
 from aerialdojo_gen.scenes.kit.street_network import StreetLayout
 from aerialdojo_gen.scenes.kit.streets import parking_row
 from aerialdojo_gen.scenes.kit.town_buildings import PARAPET_M
+from aerialdojo_gen.scenes.placement import DRAWN
 
 # What stands along pavements, before shops and on roofs, in turn.
 _IN_TURN = {place: things.split() for place, things in TABLES["furniture"].items()}
@@ -113,13 +114,12 @@ class Furniture:
 
     def _try(self, category: str, pose: Pose, phrase: str = "", scale: float = 1.0) -> bool:
         street = "" if phrase else self._streets.street(pose.x, pose.y)
-        # Plants come as often as their weights say: nobody plants every fifth tree pink.
         prop = self._site.catalogue[category]
-        alike = prop.variants[0].name if category in _ALIKE else None
-        return self._placer.place(
-            category, pose, phrase=phrase or (f"on {street}" if street else ""), scale=scale, variant=alike,
-            drawn=prop.kind == "vegetation",
-        )  # fmt: skip
+        # Plants come as often as their weights say: nobody plants every fifth tree pink.
+        drawn = DRAWN if prop.kind == "vegetation" else None
+        variant = prop.variants[0].name if category in _ALIKE else drawn
+        phrase = phrase or (f"on {street}" if street else "")
+        return self._placer.place(category, pose, phrase=phrase, scale=scale, variant=variant)
 
     def _on_street(self, category: str, pose: Pose) -> bool:
         """Place a thing beside a street, not in one."""
@@ -148,12 +148,10 @@ class Furniture:
             return
         road, line = self._streets.roads[near[0]], self._streets.lines[near[0]]
         s = line.project(Point(x, y))
-        yaw, at = _direction(line, s, 0.5), line.interpolate(s)
         side = -1.0 if self._drive_on == "right" else 1.0
         for way in (1.0,) if road.get("oneway") else (1.0, -1.0):
-            d = side * way * (road["width_m"] / 2 + 0.6)
-            u, v = at.x - d * math.sin(yaw), at.y + d * math.cos(yaw)
-            self._on_street("traffic_light", Pose(u, v, math.degrees(yaw) + (180.0 if way > 0 else 0.0)))
+            kerb = _aside(line, s, side * way * (road["width_m"] / 2 + 0.6), 180.0 if way > 0 else 0.0)
+            self._on_street("traffic_light", kerb)
 
     def _park(self, road: Table, line: LineString, k: int) -> None:
         for n, pose in enumerate(_kerbside(road, line, _BAY_M, -1.15)):
@@ -177,11 +175,9 @@ class Furniture:
                 if rng.random() >= _SHARE_DRIVING * line.length / (count * _TRAFFIC_M):
                     continue
                 s = (n + rng.uniform(0.2, 0.8)) * line.length / count
-                yaw, at = _direction(line, s, 0.5), line.interpolate(s)
-                x, y = at.x - middle * math.sin(yaw), at.y + middle * math.cos(yaw)
-                if not shapely.intersects(self._streets.layout.busy, Point(x, y).buffer(1.0)):
-                    facing = math.degrees(yaw) + (180.0 if back else 0.0)
-                    self._try(_drawn(TABLES["driven"], rng.random()), Pose(x, y, facing))
+                pose = _aside(line, s, middle, 180.0 if back else 0.0)
+                if not shapely.intersects(self._streets.layout.busy, Point(pose.x, pose.y).buffer(1.0)):
+                    self._try(_drawn(TABLES["driven"], rng.random()), pose)
 
     def _car_park(self, area: Table, k: int) -> None:
         plan = area["plan"].intersection(self._site.extent)
@@ -283,16 +279,15 @@ def _kerbside(road: Table, line: LineString, spacing_m: float, offset_m: float) 
     count = round(line.length / spacing_m)
     for k in range(count):
         s = (k + 0.5) * line.length / count
-        yaw, at = _direction(line, s, 0.3), line.interpolate(s)
         for side in (1, -1):
-            d = side * (road["width_m"] / 2 + offset_m)
-            yield Pose(at.x - d * math.sin(yaw), at.y + d * math.cos(yaw), math.degrees(yaw) - 90.0 * side)
+            yield _aside(line, s, side * (road["width_m"] / 2 + offset_m), -90.0 * side, 0.3)
 
 
-def _direction(line: LineString, s: float, reach_m: float) -> float:
-    """Direction of a line at a place along it, radians."""
+def _aside(line: LineString, s: float, left_m: float, turn_deg: float, reach_m: float = 0.5) -> Pose:
+    """Pose to the left of a line, `s` metres along it, turned from its direction; that is measured over `reach_m`."""
     a, b = line.interpolate(max(s - reach_m, 0.0)), line.interpolate(min(s + reach_m, line.length))
-    return math.atan2(b.y - a.y, b.x - a.x)
+    yaw, at = math.atan2(b.y - a.y, b.x - a.x), line.interpolate(s)
+    return Pose(at.x - left_m * math.sin(yaw), at.y + left_m * math.cos(yaw), math.degrees(yaw) + turn_deg)
 
 
 def _next(place: str, turn: int) -> str:

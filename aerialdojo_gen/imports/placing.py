@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from aerialdojo_gen.scenes.grammar import Pose
-from aerialdojo_gen.scenes.placement import DRAWN, Placement
+from aerialdojo_gen.scenes.placement import Placement
 from aerialdojo_gen.scenes.site import MAX_NODES, Site
 
 _MAX_ROWS = 2000
@@ -27,16 +27,15 @@ class Placer:
 
     def place(
         self, category: str, pose: Pose, *, phrase: str = "", scale: float = 1.0, on: float | None = None,
-        settle_m: float | None = None, drawn: bool = False, variant: str | None = None,
+        settle_m: float | None = None, variant: str | None = None,
     ) -> bool:  # fmt: skip
-        """Place a thing where it has room: the variant that is given, a drawn one, or the one used least."""
+        """Place a thing where it has room: the variant that is given, a `DRAWN` one, or the one used least."""
         # The ground is one too.
         if len(self.site.instances) + 1 >= MAX_NODES:
             self.left_out += 1
             return False
         x, y, yaw_deg = round(pose.x, 2), round(pose.y, 2), round(pose.yaw_deg % 360.0, 1)
         settle_m = None if on is not None else settle_m or self._settle_m
-        variant = DRAWN if drawn and variant is None else variant
         one = Placement(category, x, y, yaw_deg, variant, on, phrase, scale=scale, settle_m=settle_m)
         thing = self.site.place(one, "skip")
         if thing is None:

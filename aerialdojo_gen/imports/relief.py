@@ -20,6 +20,7 @@ from aerialdojo_gen.imports.map_tags import TABLES
 from aerialdojo_gen.imports.placing import Placer
 from aerialdojo_gen.scenes.grammar import Pose, poisson_disc
 from aerialdojo_gen.scenes.kit.town_buildings import surface_areas
+from aerialdojo_gen.scenes.placement import DRAWN
 from aerialdojo_gen.scenes.terrain import Terrain, heights_text
 
 Floats = NDArray[np.float64]
@@ -125,7 +126,7 @@ def _grow_things(placer: Placer, surfaces: Mapping[str, float], water_z_m: float
     for category, spacing, most, kind in _COUNTRY["growth"]:
         area = free[kind].intersection(site.extent.buffer(-1.5))
         for x, y, yaw in poisson_disc(area, spacing, site.rng_for("grow", category, kind), limit=most):
-            placer.place(category, Pose(x, y, yaw), drawn=True)
+            placer.place(category, Pose(x, y, yaw), variant=DRAWN)
 
 
 def _landmarks(placer: Placer, water_z_m: float | None) -> None:
@@ -137,7 +138,7 @@ def _landmarks(placer: Placer, water_z_m: float | None) -> None:
         if not len(dry):
             return
         x, y, _ = dry[int(np.argmax(dry[:, 2]))]
-        placer.place(category, Pose(float(x), float(y), 90.0 * k), settle_m=1.0, drawn=True)
+        placer.place(category, Pose(float(x), float(y), 90.0 * k), settle_m=1.0, variant=DRAWN)
         # The next one stands far from it.
         spots = spots[np.hypot(spots[:, 0] - x, spots[:, 1] - y) > 0.45 * max(site.head.size_m)]
 

@@ -55,15 +55,15 @@ def built(place):
 
 
 def test_buildings_are_as_high_and_as_wide_as_their_tags_say(town):
-    found = built(town)
-    tops = {name: float(i.bounds[1, 2]) for name, i in found.items()}
+    buildings = built(town)
+    tops = {name: float(i.bounds[1, 2]) for name, i in buildings.items()}
     wanted = {"tall": 21.5, "levels": 4 * 3.2, "house": 8.0, "hall": 30 * 0.3048}
     assert tops == pytest.approx(wanted, abs=0.01)
     for name in ("tall", "levels"):
-        assert np.abs(found[name].bounds[:, :2].ravel() - Polygon(maps.BUILDINGS[name][0]).bounds).max() < 0.02
+        assert np.abs(buildings[name].bounds[:, :2].ravel() - Polygon(maps.BUILDINGS[name][0]).bounds).max() < 0.02
     # A hip's ridge is the highest line of it, and its eaves are 3 m below.
-    assert np.any(np.abs(found["hall"].vertices[:, 2] - (tops["hall"] - 3.0)) < 0.01)
-    assert found["house"].attributes["colour"] == "red"
+    assert np.any(np.abs(buildings["hall"].vertices[:, 2] - (tops["hall"] - 3.0)) < 0.01)
+    assert buildings["house"].attributes["colour"] == "red"
     assert any("3 by their height, 1 by their levels" in line for line in town.notes)
 
 
@@ -106,6 +106,13 @@ def test_things_of_the_map_are_the_catalogues_and_what_is_in_a_building_is_not(t
     assert cars
     road = shapely.union_all([shapely.box(-60, -3.3, 60, 3.3), shapely.box(-6, -60, 6, 4)])
     assert all(road.contains(Point(c.centroid[:2])) for c in cars)
+    rows = [row for entry in maps.plan_of(town)["site"] for row in entry.get("place", ()) if isinstance(row, list)]
+    driving = [(y, yaw) for _, x, y, yaw in rows if abs(y) < 3.2 and abs(x) > 8.0]
+    assert len(driving) >= 2
+    assert all(yaw == (0.0 if y < 0.0 else 180.0) for y, yaw in driving)
+    # Lamps look at their street, and all are of one kind.
+    lamps = {(what, y, yaw) for what, _, y, yaw in rows if what.startswith("street_lamp") and abs(y) < 4.0}
+    assert lamps == {("street_lamp:single", 3.7, 270.0)}
 
 
 def test_nobody_is_in_a_building_and_everybody_may_be_in_the_street(town):
@@ -215,12 +222,12 @@ def test_several_boxes_are_read_at_once_as_each_by_itself(extract):
     middle = (west + east) / 2
     boxes = [(west, south, middle, north), (west, south, east, (south + north) / 2)]
     together = read_maps(extract, boxes)
-    for box, found in zip(boxes, together, strict=True):
+    for box, mapped in zip(boxes, together, strict=True):
         (alone,) = read_maps(extract, [box])
-        assert alone == found
+        assert alone == mapped
         window = shapely.box(*box)
-        assert all(window.intersects(f.shape) for f in (*found.points, *found.lines, *found.areas))
-    assert {len(found.points) for found in together} != {len(maps.POINTS)}
+        assert all(window.intersects(f.shape) for f in (*mapped.points, *mapped.lines, *mapped.areas))
+    assert {len(mapped.points) for mapped in together} != {len(maps.POINTS)}
 
 
 @pytest.mark.parametrize(

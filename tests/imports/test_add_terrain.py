@@ -119,8 +119,8 @@ def test_a_geotiff_in_degrees_is_the_same_relief_in_metres(tmp_path):
     options = ReliefOptions(size_m=(80.0, 80.0), cell_m=4.0, bare=True, attribution="A survey")
     place = add_terrain("Degrees", maps.hill_tif(tmp_path / "x.tif"), tmp_path / "mine", options)
     x, y = np.meshgrid(np.arange(-36.0, 37.0, 8.0), np.arange(-36.0, 37.0, 8.0))
-    found = maps.ground_z(place.scene, np.column_stack([x.ravel(), y.ravel()])) + maps.origin_z(place)
-    np.testing.assert_allclose(found, maps.hill(x, y).ravel(), atol=0.05)
+    z = maps.ground_z(place.scene, np.column_stack([x.ravel(), y.ravel()])) + maps.origin_z(place)
+    np.testing.assert_allclose(z, maps.hill(x, y).ravel(), atol=0.05)
     assert place.scene.attribution == "A survey"
 
 
@@ -132,9 +132,9 @@ def test_missing_heights_are_the_nearest_ones(tmp_path):
     path.write_text(f"ncols 61\nnrows 61\nxllcenter -60\nyllcenter -60\ncellsize 2\nNODATA_value -9999\n{rows}\n")
     place = add_terrain("Hole", path, tmp_path / "mine", ReliefOptions(bare=True))
     assert any("16 of 3,721 heights" in line for line in place.notes)
-    known = maps.heights(2.0, 60.0)
-    found = maps.ground_z(place.scene, np.array([[2 * 21 - 60.0, 60.0 - 2 * 11]]))[0] + maps.origin_z(place)
-    assert known[9:15, 19:25].min() - 0.02 <= found <= known[9:15, 19:25].max() + 0.02
+    model = maps.heights(2.0, 60.0)
+    filled = maps.ground_z(place.scene, np.array([[2 * 21 - 60.0, 60.0 - 2 * 11]]))[0] + maps.origin_z(place)
+    assert model[9:15, 19:25].min() - 0.02 <= filled <= model[9:15, 19:25].max() + 0.02
 
 
 def tif(folder, z=None, crs="EPSG:4326", dx=1e-5, nodata=None):
@@ -208,8 +208,8 @@ def test_arrays_far_larger_than_their_file_are_refused_before_they_are_made(tmp_
         with zipfile.ZipFile(path, "w") as archive:
             for key, shape in (("heights_m.npy", (4, 4)), ("cell_m.npy", ()), ("bbox_deg.npy", (4,))):
                 with archive.open(key, "w") as file:
-                    told = {"descr": "<f8", "fortran_order": False, "shape": (1 << 22,) * 2 if key == name else shape}
-                    np.lib.format.write_array_header_1_0(file, told)
+                    head = {"descr": "<f8", "fortran_order": False, "shape": (1 << 22,) * 2 if key == name else shape}
+                    np.lib.format.write_array_header_1_0(file, head)
                     file.write(bytes(8 * max(1, int(np.prod(shape)))))
         with pytest.raises(AssetError, match=rf"{name} has 17,592,186,044,416 numbers"):
             read_dem(path)

@@ -158,11 +158,11 @@ def test_tiles_lie_side_by_side_in_one_frame(tmp_path):
 )
 def test_axis_and_unit_are_guessed_by_form(up, scale, unit):
     (node,) = city(up=up)
-    found = infer_axes([node.with_vertices(node.vertices * scale)])
-    assert found.up == up
-    assert found.up_sure
+    axes = infer_axes([node.with_vertices(node.vertices * scale)])
+    assert axes.up == up
+    assert axes.up_sure
     # 190 m in millimetres may be 1.9 km in centimetres: the second guess. Metres and centimetres are the first one.
-    assert [name for _, name in found.units].index(unit) <= (unit == "millimetres")
+    assert [name for _, name in axes.units].index(unit) <= (unit == "millimetres")
 
 
 @given(st.floats(51.0, 900.0))

@@ -71,8 +71,8 @@ def drafted(place, name: str) -> dict:
 @pytest.mark.pipeline
 def test_from_a_mesh_to_tasks_by_what_the_commands_advise_past_a_scene_without_annotations(place, capsys):
     out = added(capsys, foreign.village(), "Village")
-    told, err = done(capsys, *pasted(out, "next: "))
-    assert told.strip() == str(place / "our scenes/annotations/Village.json")
+    printed, err = done(capsys, *pasted(out, "next: "))
+    assert printed.strip() == str(place / "our scenes/annotations/Village.json")
     assert "up to 7 objects by 2 landmarks" in err  # eight houses and a tower
     draft = drafted(place, "Village")
     assert len(draft["landmarks"]) == 2
@@ -152,9 +152,9 @@ def test_drafts_are_true_or_silent(place, capsys):
     _, err = done(capsys, *draft)
     made = drafted(place, "Depot")
     texts = [entry["name"] for entry in made["objects"]]
-    told = "\n".join([*texts, *(mark["name"] for mark in made["landmarks"])])
-    assert not re.search(r"\b(mesh|c3e0b|ceb|c e b|a3f9c|afc|a f c|\d+)\b", told), told
-    assert not re.search(r"\ba (low |tall |long )*(green )?leaves", told), told
+    names = "\n".join([*texts, *(mark["name"] for mark in made["landmarks"])])
+    assert not re.search(r"\b(mesh|c3e0b|ceb|c e b|a3f9c|afc|a f c|\d+)\b", names), names
+    assert not re.search(r"\ba (low |tall |long )*(green )?leaves", names), names
     assert {entry["category"] for entry in made["objects"]} >= {"truck", "cylinder", "box"}
     assert {entry["name"] for entry in made["objects"] if is_unnamed(entry["node"], entry["category"])} == {
         "grey cylinder", "grey box",
@@ -202,9 +202,9 @@ def test_a_table_says_what_nodes_are_called(place, capsys):
     assert not any("fountain" in name for name in names)
     # The same table as TOML; a row that fits nothing is told.
     (place / "names.toml").write_text('"mesh_0*" = {name = "shed"}\n"Tower*" = "red tower"\n')
-    told, _ = done(capsys, "add-scene", "Two", "Garden.glb", "--up", "z", "--names", "names.toml")
-    assert "'Tower*' fits no node and no material of the file" in told
-    assert "mesh_0" not in told
+    printed, _ = done(capsys, "add-scene", "Two", "Garden.glb", "--up", "z", "--names", "names.toml")
+    assert "'Tower*' fits no node and no material of the file" in printed
+    assert "mesh_0" not in printed
     (place / "names.csv").write_text("pattern,name\n*,mesh_7\n")
     code, _, err = said(capsys, "add-scene", "Other", "Garden.glb", "--up", "z", "--names", "names.csv")
     assert code == 1
@@ -260,8 +260,8 @@ def test_pieces_of_a_merged_mesh_are_put_together_and_named_by_their_materials(t
         lines += [f"f {a} {b} {c}" for a, b, c in (body.faces + n).tolist()]
         n += len(body.vertices)
     (tmp_path / "merged.obj").write_text("\n".join(lines))
-    told = [f"newmtl {m}\nKd {paint}" for (m, *_), paint in zip(pieces, paints, strict=True)]
-    (tmp_path / "m.mtl").write_text("\n".join(told))
+    library = [f"newmtl {m}\nKd {paint}" for (m, *_), paint in zip(pieces, paints, strict=True)]
+    (tmp_path / "m.mtl").write_text("\n".join(library))
     scene, _ = import_mesh("Merged", foreign.read_here(tmp_path / "merged.obj"))
     looks = [(i.category, i.attributes.get("material", ""), i.attributes["colour"]) for i in scene.instances]
     assert sorted(looks) == [

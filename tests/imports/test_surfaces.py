@@ -46,8 +46,8 @@ def test_a_dome_is_drawn_and_never_in_the_way(kind, name, tmp_path):
     write_glb(scene, tmp_path / "yard.glb")
     again = read_glb(tmp_path / "yard.glb")
     for kept in ("backdrop", "instances"):
-        told = [[(i.node, i.surface, len(i.faces)) for i in getattr(one, kept)] for one in (again, scene)]
-        assert told[0] == told[1]
+        kept_of = [[(i.node, i.surface, len(i.faces)) for i in getattr(one, kept)] for one in (again, scene)]
+        assert kept_of[0] == kept_of[1]
     assert ClearanceGrid.build(again).reachable([0.0, 8.0, 3.0])
     free, bare = (CollisionWorld(one).distance_m([0.0, 8.0, 3.0]) for one in (again, plain_scene))
     assert free == bare
@@ -119,8 +119,8 @@ def scan(seed: int) -> tuple[RawNode, list[np.ndarray]]:
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_what_stands_out_of_one_surface_becomes_things(seed):
     node, places = scan(seed)
-    bodies, told = split_components([node])
-    assert told.attached == len(places)
+    bodies, stats = split_components([node])
+    assert stats.attached == len(places)
     assert len(bodies) == 1 + len(places)
     assert sum(len(b.faces) for b in bodies) == len(node.faces)
     middles = [(b.vertices.min(axis=0) + b.vertices.max(axis=0))[:2] / 2 for b in bodies[1:]]
@@ -136,8 +136,8 @@ def test_what_stands_out_of_one_surface_becomes_things(seed):
 
 
 def test_bare_hills_are_not_taken_apart():
-    bodies, told = split_components([raw(hills(7, cells=30, relief_m=14.0).mesh())])
-    assert (len(bodies), told.attached) == (1, 0)
+    bodies, stats = split_components([raw(hills(7, cells=30, relief_m=14.0).mesh())])
+    assert (len(bodies), stats.attached) == (1, 0)
 
 
 def test_a_fence_does_not_swallow_what_it_stands_around_and_a_house_has_its_chimney():
@@ -149,8 +149,8 @@ def test_a_fence_does_not_swallow_what_it_stands_around_and_a_house_has_its_chim
     *sides, house, roof, tower, hatch = (trimesh.creation.box(bounds=both) for both in corners)
     fence = trimesh.util.concatenate(sides)
     ring = trimesh.creation.annulus(18, 20, 9).apply_translation([20, 20, 4.5])
-    bodies, told = split_components([raw(trimesh.util.concatenate([ring, house, roof, tower, hatch]))])
-    assert told.pieces == 5
+    bodies, stats = split_components([raw(trimesh.util.concatenate([ring, house, roof, tower, hatch]))])
+    assert stats.pieces == 5
     assert sorted(len(b.faces) for b in bodies) == sorted([len(ring.faces), 12, 12, 24])
     assert len(split_components([raw(fence, "Fence"), raw(house, "House")])[0]) == 2
 

@@ -39,8 +39,8 @@ def stored(scene: Scene, path: Path) -> Scene:
 
 
 def thing(scene: Scene, category: str):
-    (found,) = [i for i in scene.instances if i.category == category]
-    return found
+    (one,) = [i for i in scene.instances if i.category == category]
+    return one
 
 
 def imported(path: Path, **options) -> Scene:
@@ -88,16 +88,16 @@ def test_a_lit_wall_shows_its_texture_and_holes_are_looked_through(yard, rendere
     hedge = thing(yard, "hedge").centroid
     with renderer(yard) as camera:
         rgb = camera.render(CAMERA, look_at_pose(np.array([0.0, -6, 4]), np.array([0.0, 0, 4]))).rgb[64:192, 64:192]
-        seen = np.abs(camera.render(CAMERA, look_at_pose(hedge + np.array([0, 6, 0]), hedge)).depth_m - 6.0) < 0.02
+        leaves = np.abs(camera.render(CAMERA, look_at_pose(hedge + np.array([0, 6, 0]), hedge)).depth_m - 6.0) < 0.02
     # From 6 m the middle half of the picture shows 6 of the wall's 8 m.
     wanted = cv2.resize(textured.photograph()[32:224, 32:224], (128, 128), interpolation=cv2.INTER_AREA)
     for channel in range(3):
         assert np.corrcoef(rgb[..., channel].ravel(), wanted[..., channel].ravel())[0, 1] > 0.8
     # A quarter of the hedge's 4 x 4 m has leaves: its middle.
     edge = 2.0 / 6.0 * 128
-    assert seen[128, 128]
-    assert seen.sum() == pytest.approx(edge**2, rel=0.15)
-    assert np.ptp(np.nonzero(seen), axis=1) == pytest.approx([edge, edge], abs=4)
+    assert leaves[128, 128]
+    assert leaves.sum() == pytest.approx(edge**2, rel=0.15)
+    assert np.ptp(np.nonzero(leaves), axis=1) == pytest.approx([edge, edge], abs=4)
 
 
 @pytest.mark.parametrize(
@@ -115,13 +115,13 @@ def test_a_dome_is_drawn_as_it_is_behind_everything_and_changes_nothing_else(ren
     assert len(under.backdrop) == 1
     poses = [look_at_pose(np.array([0.0, 0, 4]), np.array(at)) for at in ((20.0, 0, 8), (-20, 0, 8), (0, 10, 3))]
     with renderer(under) as camera:
-        seen = [camera.render(CAMERA, pose) for pose in poses]
+        pictures = [camera.render(CAMERA, pose) for pose in poses]
     with renderer(bare) as camera:
         without = [camera.render(CAMERA, pose) for pose in poses]
     # East of the middle it is blue, west of it sandy: neither light nor haze nor distance changes that.
-    for picture, colour in zip(seen, ((40, 90, 200), (230, 170, 90)), strict=False):
+    for picture, colour in zip(pictures, ((40, 90, 200), (230, 170, 90)), strict=False):
         np.testing.assert_allclose(picture.rgb[:40].reshape(-1, 3), np.tile(colour, (40 * 256, 1)), atol=2)
-    for picture, other in zip(seen, without, strict=True):
+    for picture, other in zip(pictures, without, strict=True):
         np.testing.assert_array_equal(picture.depth_m, other.depth_m)
         solid = np.isfinite(picture.depth_m)
         assert 0.2 < solid.mean() < 0.8
@@ -273,8 +273,8 @@ def test_an_object_of_several_materials_has_all_of_them(tmp_path):
     assert sorted((s.texture is not None, s.colour) for s in shown)[0] == (False, (0, 255, 0))
     assert [s.texture is not None for s in shown].count(True) == 1
     # An object stays one where its materials are not there, or are not told apart.
-    for told in ("newmtl one\nKd 0 1 0\n", "", None):
-        (tmp_path / "m.mtl").unlink() if told is None else (tmp_path / "m.mtl").write_text(told)
+    for library in ("newmtl one\nKd 0 1 0\n", "", None):
+        (tmp_path / "m.mtl").unlink() if library is None else (tmp_path / "m.mtl").write_text(library)
         (node,) = read_here(tmp_path / "wall.obj")
         assert (node.name, len(node.faces)) == ("Wall", 2)
 

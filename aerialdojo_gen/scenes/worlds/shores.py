@@ -29,7 +29,7 @@ def coast(
         angle = math.radians(deg)
         x, y = at[0] + radii_m[0] * share * math.cos(angle), at[1] + radii_m[1] * share * math.sin(angle)
         points.append(point(min(max(x, 4 - w), w - 4), min(max(y, 4 - d), d - 4)))
-    draft.lines[name] = {"points": [list(p) for p in points], "smooth": 1}
+    draft.lines[name] = {"points": points, "smooth": 1}
     return shapely.Polygon(smoothed(points, 1).coords).buffer(0)
 
 
@@ -89,7 +89,7 @@ def jetty(draft: Draft, land: BaseGeometry, at: Point, yaw_deg: float, length_m:
     if not is_open(draft, land, _strip(at, yaw_deg, 2.5, length_m + 7, 5.5), 0.3):
         return False
     draft.make(
-        "pier", at=list(foot), yaw_deg=round(yaw_deg, 1), length_m=length_m + 2.2, width_m=width, z="jetty",
+        "pier", at=foot, yaw_deg=round(yaw_deg, 1), length_m=length_m + 2.2, width_m=width, z="jetty",
         bay_m=3.8, floor=draft.material("boards"), category="jetty",
     )  # fmt: skip
     # The berths have ground of their own, which nothing that drifts may take.
@@ -114,14 +114,14 @@ def huts_over_water(draft: Draft, land: BaseGeometry, at: Point, yaw_deg: float,
     draft.floors["boardwalk"] = 1.72
     middles = [7.5 + 9.0 * k for k in range(rows)]
     draft.make(
-        "pier", at=list(ahead(at, yaw_deg, -2.2)), yaw_deg=round(yaw_deg, 1), length_m=length + 2.2, width_m=3.2,
+        "pier", at=ahead(at, yaw_deg, -2.2), yaw_deg=round(yaw_deg, 1), length_m=length + 2.2, width_m=3.2,
         z=1.7, bay_m=3.8, rail="wood:#9a8058", gates=[[m + 0.8, m + 3.6] for m in middles], category="jetty",
         floor=draft.material("boards"),
     )  # fmt: skip
     huts = [(*ahead(at, yaw_deg, m, side * 6.3), round((yaw_deg - side * 90.0) % 360, 1)) for m in middles
             for side in (1.0, -1.0)]  # fmt: skip
     draft.make(
-        "stilt_huts", at=[list(h) for h in huts], walls=walls(draft, 4, "huts"), on="boardwalk", width_m=5.4,
+        "stilt_huts", at=huts, walls=walls(draft, 4, "huts"), on="boardwalk", width_m=5.4,
         porch_m=2.1, steps=False,
     )  # fmt: skip
     for k in range(rows):
@@ -255,10 +255,10 @@ def _houses(draft: Draft, isle: Isle) -> None:
         for side in (-1, 1):
             draft.slot("yard", *ahead((x, y), yaw, draft.number(1, 4, "yard", x, side), side * 6.2), yaw, (3.0, 3.0))
     if draft.material("homes") == "huts":
-        draft.make("stilt_huts", at=[list(p) for p in poses], walls=walls(draft, len(poses), "home"))
+        draft.make("stilt_huts", at=poses, walls=walls(draft, len(poses), "home"))
         return
     draft.make(
-        "house_row", at=[list(p[:2]) for p in poses], yaws_deg=[p[2] for p in poses], walls=walls(draft, 6, "home"),
+        "house_row", at=[p[:2] for p in poses], yaws_deg=[p[2] for p in poses], walls=walls(draft, 6, "home"),
         style={"width_m": draft.number(6.0, 6.9, "house_w"), "depth_m": 5.6, "storeys": 1, "storey_m": 2.7,
                "roof_m": draft.number(2.0, 2.8, "house_roof")},
         roofs=[draft.material("roof", k) for k in range(2)], doors=["#2f5f6e", "#6e2f2a", "#e9dcb0"],

@@ -23,7 +23,7 @@ _EDGE_LANE_M, _EDGE_PAVEMENT_M = 3.25, 2.0
 def street_along(draft: Draft, y: float) -> float:
     """Pave a street along x; slots on its lanes (``road``) and pavements (``kerb``); gives half its width, metres."""
     ends, half = [(-draft.half[0], y), (draft.half[0], y)], _EDGE_LANE_M + _EDGE_PAVEMENT_M
-    draft.make("streets", paths=[[list(p) for p in ends]], lanes=2, pavement_m=_EDGE_PAVEMENT_M)
+    draft.make("streets", paths=[ends], lanes=2, pavement_m=_EDGE_PAVEMENT_M)
     line = shapely.LineString(ends)
     draft.take(line.buffer(half, cap_style="flat"))
     for at in np.arange(4.0, line.length - 4.0, 7.5):

@@ -47,7 +47,7 @@ def winding(draft: Draft, name: str, ends: tuple[Point, Point], swing_m: float, 
     offsets = [(k / (bends + 1), float(rng.uniform(-swing_m, swing_m))) for k in range(1, bends + 1)]
     bent = [(x0 + f * (x1 - x0) + nx * off, y0 + f * (y1 - y0) + ny * off) for f, off in offsets]
     points = [ends[0], *bent, ends[1]]
-    draft.lines[name] = {"points": [list(point(x, y)) for x, y in points], "smooth": 3}
+    draft.lines[name] = {"points": [point(x, y) for x, y in points], "smooth": 3}
     return smoothed(points, 3)
 
 
@@ -105,7 +105,7 @@ def bridged(draft: Draft, bed: shapely.LineString, share: float) -> list[Point]:
     across = math.radians(along + 90.0)
     draft.take(bed.buffer(3.8))
     draft.take_disc((x, y), 7.5)
-    draft.make("footbridge", at=list(point(x, y)), yaw_deg=round(along + 90.0, 1), span_m=8.5, place="")
+    draft.make("footbridge", at=point(x, y), yaw_deg=round(along + 90.0, 1), span_m=8.5, place="")
     return [point(x + u * math.cos(across), y + u * math.sin(across)) for u in (-6.5, 6.5)]
 
 
@@ -136,11 +136,15 @@ def anywhere(draft: Draft, number: int = 60, margin_m: float = 7.0) -> list[tupl
     return [(*point(rng.uniform(-w, w), rng.uniform(-d, d)), round(rng.uniform(0, 360))) for _ in range(number)]
 
 
+def trees(draft: Draft, area: Any, spacing_m: float, limit: int, stream: str = "", **keys: Any) -> None:
+    """Scatter the palette's trees over an area; `keys` are those of the entry."""
+    pattern = {"of": draft.material("trees").split("+"), "scatter": area, "spacing_m": spacing_m, "limit": limit}
+    draft.add({"pattern": pattern | ({"stream": stream} if stream else {}), **keys})
+
+
 def wood(draft: Draft, area: Any, most: float, spacing_m: float = 4.6) -> None:
     """Plant the palette's trees on what is left of an area, and what grows under them."""
-    species = draft.material("trees").split("+")
-    pattern = {"of": species, "scatter": area, "spacing_m": spacing_m, "limit": int(most), "stream": "wood"}
-    draft.add({"pattern": pattern, "fit": "skip", "room_m": 0.0})
+    trees(draft, area, spacing_m, int(most), "wood", fit="skip", room_m=0.0)
     low = draft.shuffled(["bush", "fern", "sapling", "grass_tuft", "wildflowers", "young_spruce"], "undergrowth")
     draft.make("undergrowth", area=area, kinds=[{"of": kind, "spacing_m": 3.5, "limit": 24} for kind in low[:3]])
 

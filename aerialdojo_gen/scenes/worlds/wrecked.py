@@ -77,7 +77,7 @@ def wreck(
     bites = [_bite(draft, pose, (long, deep), name, k, storeys, toward) for k in range(torn)]
     pitched = draft.chance(0.3, name, "pitched") and deep < 12.0
     draft.make(
-        "damaged_building", node=name, at=list(pose[:2]), yaw_deg=yaw % 360.0, storeys=storeys,
+        "damaged_building", node=name, at=pose[:2], yaw_deg=yaw % 360.0, storeys=storeys,
         size_m=[round(long, 2), round(deep, 2)], bites=bites, balconies=draft.chance(0.5, name, "balconies"),
         sunk_m=0.7 if lean_deg else 0.3,
         style={"wall": draft.material("wall", name), "band": draft.material("band", name), "soot": soot,

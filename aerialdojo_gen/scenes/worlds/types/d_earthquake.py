@@ -34,9 +34,9 @@ def _fault(draft: Draft, w: float, d: float) -> shapely.LineString:
     points = [point(f * w, s * far + draft.number(-4, 4, "fault", k)) for k, (f, s) in enumerate(bends)]
     line = smoothed(points, 0)
     drop = draft.number(0.7, 1.8, "drop") * (1.6 if draft.topology == "scarp" else 1.0)
-    draft.step("fault", path=[list(p) for p in points], drop_m=round(drop, 2), width_m=1.4)
+    draft.step("fault", path=points, drop_m=round(drop, 2), width_m=1.4)
     slips = [{"blob": [*point(*heading(line, 9.0 * k)[:2]), 1.5, k, 0.4]} for k in range(2, int(line.length // 9))]
-    draft.make("scarp", path=[list(p) for p in points], width_m=2.0, material=draft.material("earth"), slips=slips)
+    draft.make("scarp", path=points, width_m=2.0, material=draft.material("earth"), slips=slips)
     starts = []
     for k in range(8):
         p = line.interpolate(draft.number(0.2, 0.8, "crack", k), normalized=True)

@@ -45,17 +45,17 @@ def _where(draft: Draft, lanes: list[Box], open_: list[Box]) -> Point:
 
 def _crater(draft: Draft, at: Point, radius_m: float) -> None:
     draft.section("The crater")
-    draft.step("crater", at=list(at), radius_m=radius_m, depth_m=round(0.6 * radius_m, 1), rim_m=0.8)
+    draft.step("crater", at=at, radius_m=radius_m, depth_m=round(0.6 * radius_m, 1), rim_m=0.8)
     seed, soot = draft.whole(0, 999, "crater"), draft.material("soot")
     draft.paint({"blob": [*at, round(radius_m * 2.6, 1), seed, 0.4]}, soot)
     rays = {"count": 24, "reach": [2.4, 4.0], "spread": [0.06, 0.15], "material": soot}
-    draft.make("scorch_rays", at=list(at), radius_m=radius_m, **rays)
+    draft.make("scorch_rays", at=at, radius_m=radius_m, **rays)
     for share, role in ((1.65, "earth"), (0.98, "mud"), (0.42, "pool")):
         draft.paint({"blob": [*at, round(radius_m * share, 1), seed + round(share * 10), 0.25]}, draft.material(role))
     starts = [[*ahead(at, turn, 1.5 * radius_m), turn] for turn in (25.0, 97.0, 166.0, 235.0, 309.0)]
     draft.make("cracks", starts=starts, length_m=7, seed=seed % 90)
     if draft.chance(0.6, "rim"):
-        draft.make("crater_rim", at=list(at), radius_m=radius_m)
+        draft.make("crater_rim", at=at, radius_m=radius_m)
     draft.take_disc(at, radius_m * 1.5)
 
 
@@ -77,8 +77,8 @@ def _lot(draft: Draft, lot: Box, k: int, at: Point, radius_m: float) -> None:
 def _cordon(draft: Draft, at: Point, radius_m: float) -> None:
     """Bend street lamps away from the blast, and offer slots about the crater (``cordon``, ``rubble``)."""
     spots = (ahead(at, 72.0 * k + draft.number(0, 60, "lamp", k), radius_m * 2.2 + 2.0) for k in range(5))
-    if feet := [list(spot) for spot in spots if draft.has_room(*spot, 0.6)]:
-        draft.make("bent_lamps", feet=feet, blast=list(at))
+    if feet := [spot for spot in spots if draft.has_room(*spot, 0.6)]:
+        draft.make("bent_lamps", feet=feet, blast=at)
     for k in range(10):
         turn = 36.0 * k + draft.number(0, 30, "cordon", k)
         away = radius_m * (1.9 + 0.1 * draft.whole(0, 9, "cordon", k, "away"))

@@ -11,7 +11,7 @@ import shapely
 from aerialdojo_gen.scenes.worlds.blocks import split
 from aerialdojo_gen.scenes.worlds.draft import Draft, NoRoomError
 from aerialdojo_gen.scenes.worlds.shapes import SIDES, Box, Point, Pose, ahead, beside, point, pose_on, smoothed
-from aerialdojo_gen.scenes.worlds.wilds import about
+from aerialdojo_gen.scenes.worlds.wilds import about, trees
 
 _TRIMS = ["#f2efe6", "#5a3f2c", "#2f5a46"]
 # Of the feet of what is afloat, of cars, and of what stands in gardens, over the water.
@@ -55,7 +55,7 @@ def _banks(draft: Draft, land: _Land) -> None:
     mounds, high = land.mounds, draft.number(2.4, 3.6, "dyke")
     crests = [f"crest_{k}" for k in range(len(land.dykes))]
     for k, line in enumerate(land.dykes):
-        draft.lines[f"dyke_{k}"] = {"points": [list(p) for p in line], "smooth": 3}
+        draft.lines[f"dyke_{k}"] = {"points": line, "smooth": 3}
         draft.areas[f"crest_{k}"] = {"ribbon": f"dyke_{k}", "width_m": 4}
         draft.step("raise_bank", area=f"crest_{k}", to_m=high)
     for k, (at, radius) in enumerate(mounds):
@@ -63,7 +63,7 @@ def _banks(draft: Draft, land: _Land) -> None:
         draft.step("raise_bank", area=f"mound_{k}", to_m=draft.number(0.8, 1.8, "mound", k), slope_m=4)
     draft.section("Water, banks and mounds")
     for line in land.currents:
-        draft.make("streaks", paths=[[list(p) for p in line]], width_m=draft.number(5, 9, "current"))
+        draft.make("streaks", paths=[line], width_m=draft.number(5, 9, "current"))
     for k in range(len(mounds)):
         draft.make("paint_island", area=f"mound_{k}", slope_m=4, way=draft.material("mound", k))
     if crests:
@@ -99,7 +99,7 @@ def _houses(draft: Draft, poses: Sequence[Pose]) -> None:
             "roof": draft.material("roof", k), "roof_m": draft.number(2.6, 3.8, "roof", k),
             "storeys": draft.whole(1, 2, "storeys", k), "door": draft.material("door", k),
         }  # fmt: skip
-        draft.make("flooded_house", at=list(pose[:2]), yaw_deg=pose[2], style=style)
+        draft.make("flooded_house", at=pose[:2], yaw_deg=pose[2], style=style)
         draft.take(body)
         for side in (-1, 1):
             _wet(draft, "drowned", beside(pose, draft.number(-2, 4, "drowned", k, side), side * 9.2), pose[2])
@@ -144,9 +144,7 @@ def _trees(draft: Draft) -> None:
     draft.section("Trees in the water, and what drifts")
     banks = [{"area": name, "grow_m": 9.5 if name.startswith("crest") else 6.5} for name in draft.areas]
     open_ = {"box": list(draft.site.grown(-2.5)), **({"minus": banks} if banks else {})}
-    trees, limit = draft.material("trees").split("+"), round(draft.knob("trees"))
-    pattern = {"of": trees, "scatter": open_, "spacing_m": 9, "limit": limit, "stream": "trees"}
-    draft.add({"pattern": pattern, "on": -0.5, "fit": "skip"})
+    trees(draft, open_, 9, round(draft.knob("trees")), "trees", on=-0.5, fit="skip")
     afloat = {"categories": ["floating_debris"], "spacing_m": 10, "limit": 8, "place": "adrift on the flood"}
     draft.make("drift", area=open_, **afloat)
 

@@ -12,6 +12,7 @@ from shapely.geometry.base import BaseGeometry
 from aerialdojo_gen.scenes.worlds.draft import Draft, NoRoomError
 from aerialdojo_gen.scenes.worlds.shapes import SIDES, Box, Point, Pose, ahead, heading, smoothed, towards
 from aerialdojo_gen.scenes.worlds.shores import afloat, jetty, walls
+from aerialdojo_gen.scenes.worlds.wilds import trees
 
 _NAMES = ("FISH MARKET", "PORT OFFICE", "SHED", "ICE HOUSE", "CUSTOMS", "ROPE WORKS", "COLD STORE", "SHIP CHANDLER",
           "BOATYARD", "FERRY", "GRAIN STORE", "SAILMAKER", "NORTH QUAY", "TIMBER", "DRY DOCK", "COFFEE")  # fmt: skip
@@ -39,12 +40,12 @@ class _Port:
         c, s = self.fx * math.cos(math.radians(yaw_deg)), self.fy * math.sin(math.radians(yaw_deg))
         return round(towards((0.0, 0.0), (c, s)) % 360.0, 1)
 
-    def line(self, points: Sequence[Point]) -> list[list[float]]:
+    def line(self, points: Sequence[Point]) -> list[Point]:
         """Points as the plan has them."""
-        return [list(self.at(*p)) for p in points]
+        return [self.at(*p) for p in points]
 
     def slot(self, kind: str, x: float, y: float, yaw_deg: float, room_m: Point, on: str | None = None) -> None:
-        """Offer a place where the ground is free."""
+        """Offer a place to what fits there."""
         self.draft.slot(kind, *self.at(x, y), self.yaw(yaw_deg), room_m, on=on)
 
     def quays(self, boxes: Sequence[tuple[float, float, float, float]]) -> None:
@@ -183,8 +184,7 @@ def _garden(port: _Port, box: tuple[float, float, float, float]) -> None:
     """Plant a strip of green behind the houses."""
     port.paved(box, "green")
     draft, area = port.draft, port.box(*box).grown(-1.6)
-    trees = draft.material("trees").split("+")
-    draft.add({"pattern": {"of": trees, "scatter": area.rounded(), "spacing_m": 6.5, "limit": 18}, "fit": "skip"})
+    trees(draft, area.rounded(), 6.5, 18, fit="skip")
     draft.take(area.shape())
     draft.slots_over("garden", area, 8.0, (3.0, 3.0), yaw_deg=port.yaw(-90))
 
@@ -215,7 +215,7 @@ def _stacks(port: _Port, x0: float, y0: float, x1: float, y1: float) -> None:
     draft.make("container_stacks", on="quay", stacks=stacks)
     masts = [port.at(x0 + 33.0 * i - 3.6, y0 - 3.6) for i in range(1, columns)]
     if masts:
-        draft.make("light_masts", at=[list(m) for m in masts], foot_m="quay", top_m=draft.number(15, 18, "masts"))
+        draft.make("light_masts", at=masts, foot_m="quay", top_m=draft.number(15, 18, "masts"))
         draft.take(shapely.MultiPoint(masts).buffer(1.2))
 
 

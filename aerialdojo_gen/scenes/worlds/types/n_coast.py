@@ -67,7 +67,7 @@ def _mainland(draft: Draft, shore: _Shore, line: Callable[[float], float]) -> sh
         ripple = sum(a * math.sin(math.radians(n * 180.0 * u / out + phase)) for n, a, phase in ripples)
         flat.append((u, line(u) + ripple))
     points = [shore.at(u, v) for u, v in (*flat, (out, shore.half_v + 20), (-out, shore.half_v + 20))]
-    draft.lines["coast"] = {"points": [list(p) for p in (*points, points[0])], "smooth": 1}
+    draft.lines["coast"] = {"points": [*points, points[0]], "smooth": 1}
     return shapely.Polygon(smoothed([*points, points[0]], 1).coords).buffer(0)
 
 
@@ -98,7 +98,7 @@ def _beach(draft: Draft, shore: _Shore) -> Isle:
         u = (-0.8 + 0.4 * k) * shore.half_u + draft.number(-3, 3, "groyne", k)
         if abs(u - middle) > 14.0:
             ends = _behind(shore, land, u, 4.5), _behind(shore, land, u, -9.0)
-            lines.append([list(p) for p in ends])
+            lines.append(ends)
             draft.take(shapely.LineString(ends).buffer(1.2))
     if lines:
         draft.make("groynes", lines=lines, height_m=1.5)
@@ -160,7 +160,7 @@ def _estuary(draft: Draft, shore: _Shore) -> Isle:
     across = along + 90.0
     draft.section("The bridge")
     start = ahead((middle[0], middle[1]), across, -(width / 2 + 3.5))
-    draft.make("pier", at=list(start), yaw_deg=round(across, 1), length_m=round(width + 7.0, 1), width_m=3.0, z=1.7,
+    draft.make("pier", at=start, yaw_deg=round(across, 1), length_m=round(width + 7.0, 1), width_m=3.0, z=1.7,
                bay_m=4.2, rail=draft.material("rail"), category="footbridge")  # fmt: skip
     draft.take(shapely.LineString([start, ahead(start, across, width + 7.0)]).buffer(4.0))
     u = at + side * draft.number(19, 24, "village")
@@ -176,7 +176,7 @@ def _spit(draft: Draft, shore: _Shore) -> Isle:
     reach, v = draft.number(0.42, 0.56, "reach") * shore.half_u, base - draft.number(35, 40, "out")
     bends = ((-0.72, base + 5.0), (-0.7, base - 10.0), (-0.5, v + 3.0), (0.0, v))
     points = [*(shore.at(f * shore.half_u, y) for f, y in bends), shore.at(reach, v + 2.0)]
-    draft.lines["hook"] = {"points": [list(p) for p in points], "smooth": 2}
+    draft.lines["hook"] = {"points": points, "smooth": 2}
     wide = draft.number(12, 15, "wide")
     body = smoothed(points, 2).buffer(wide / 2)
     end = points[-1]

@@ -113,7 +113,7 @@ def _village(draft: Draft, number: int, facing: Point, reach_m: float) -> None:
     poses = wilds.houses_about(draft, number, 5.9, "village", facing, reach_m, 3, "the village")
     draft.section("The village")
     houses = [
-        {"name": f"house_{k}", "at": list(pose[:2]), "yaw_deg": pose[2], "wall": draft.material("wall", k),
+        {"name": f"house_{k}", "at": pose[:2], "yaw_deg": pose[2], "wall": draft.material("wall", k),
          "size_m": [draft.number(5.4, 6.4, "deep", k), draft.number(6.0, 8.0, "wide", k),
                     draft.number(3.1, 3.9, "high", k) + (2.8 if draft.chance(0.25, "tower", k) else 0.0)]}
         for k, pose in enumerate(poses)
@@ -132,7 +132,7 @@ def _canyon(draft: Draft, w: float, d: float) -> list[Point]:
     bed = []
     for k in range(8):
         along, off = (k / 3.5 - 1.0) * (far + 2), draft.number(-0.22, 0.22, "bed", k) * wide
-        bed.append(list(point(off, along) if turned else point(along, off)))
+        bed.append(point(off, along) if turned else point(along, off))
     line = shapely.LineString(bed)
     draft.lines["bed"] = bed
     draft.lines["bed_way"] = {"points": "bed", "smooth": 3}
@@ -184,7 +184,7 @@ def _dig(draft: Draft, w: float, d: float) -> list[Point]:
             if draft.chance(0.75, "wall", k, part):
                 ends = [ahead(at, turn, outer, f * outer) for f in (a, b)]
                 high = draft.number(1.8, 4.2, "wall", k, part, "m")
-                walls.append({"line": [list(e) for e in ends], "height_m": high})
+                walls.append({"line": ends, "height_m": high})
                 draft.take(shapely.LineString(ends).buffer(1.0))
         draft.slot("dig", *ahead(at, turn, outer, 0.5), turn, (4.8, 3.4))
         for f in (-0.6, 0.6):
@@ -231,7 +231,7 @@ def _serai(draft: Draft, w: float, d: float) -> list[Point]:
     for k in range(4):
         turn = yaw + 90 * k
         for a, b in ((-1.0, -0.18), (0.18, 1.0)):
-            ends = [list(ahead(at, turn, half, f * half)) for f in (a, b)]
+            ends = [ahead(at, turn, half, f * half) for f in (a, b)]
             walls.append({"line": ends, "height_m": draft.number(3.0, 4.0, "wall", k, a), "decay": 0.3})
         for f in (-0.55, 0.55) if k % 2 == 0 else ():
             x, y = ahead(at, turn, half - 4.2, f * half)

@@ -83,7 +83,7 @@ def _glades(draft: Draft, w: float, d: float) -> None:
 def _hill(draft: Draft, w: float, d: float) -> None:
     at = (draft.number(-w / 4, w / 4, "hill_x"), draft.number(-d / 4, d / 4, "hill_y"))
     radius = draft.number(18, 26, "hill_r")
-    draft.step("hill", at=list(at), radius_m=radius, height_m=draft.number(5, 9, "hill_h"))
+    draft.step("hill", at=at, radius_m=radius, height_m=draft.number(5, 9, "hill_h"))
     draft.step("level_area", area={"disc": [*at, 5.5]}, blend_m=5)
     wilds.about(draft, "hill", at, (2.5, 5.0), 6, (2.8, 2.8))
     draft.take_disc(at, 6.5)
@@ -118,7 +118,7 @@ def _ruin(draft: Draft, w: float, d: float) -> None:
     walls: list[dict[str, Any]] = [{"ends": e, "height_m": h} for e, h in zip(ends_of, high, strict=True)]
     walls[0]["openings"] = [[1.2, 2.3, 0.8, 1.3]]
     yaw = draft.number(0, 180, "ruin")
-    draft.make("roofless_walls", node="ruin", at=list(at), yaw_deg=yaw, stone=draft.material("stone"), walls=walls)
+    draft.make("roofless_walls", node="ruin", at=at, yaw_deg=yaw, stone=draft.material("stone"), walls=walls)
     wilds.about(draft, "hill", at, (10.5, 12.5), 8, (2.6, 2.6))
     draft.take_disc(at, 14)
     ends = {

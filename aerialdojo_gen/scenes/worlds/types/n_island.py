@@ -60,7 +60,7 @@ def _atoll(draft: Draft, w: float, d: float) -> Isle:
     open_deg, turn = draft.number(0, 360, "open"), draft.number(95, 115, "turn")
     turns = [math.radians(open_deg + 180 - turn * 1.4 + turn * 2.8 * k / 100) for k in range(0, 101, 10)]
     arc = [point(w * 0.66 * math.cos(a), d * 0.66 * math.sin(a)) for a in turns]
-    draft.lines["reef"] = {"points": [list(p) for p in arc], "smooth": 1}
+    draft.lines["reef"] = {"points": arc, "smooth": 1}
     width = draft.number(17, 21, "reef")
     parts, land = [{"ribbon": "reef", "width_m": width, "round_ends": True}], smoothed(arc, 1).buffer(width / 2)
     for k in (1, 5, 9):
@@ -107,7 +107,7 @@ def _twins(draft: Draft, w: float, d: float) -> Isle:
     if not 5.0 < span < 45.0:
         raise NoRoomError("no room for the bridge")
     draft.section("The bridge")
-    draft.make("pier", at=list(ahead(start, yaw, -2.4)), yaw_deg=round(yaw, 1), length_m=round(span + 4.8, 1),
+    draft.make("pier", at=ahead(start, yaw, -2.4), yaw_deg=round(yaw, 1), length_m=round(span + 4.8, 1),
                width_m=3.0, z=1.9, bay_m=4.6, rail=draft.material("rail"), category="footbridge")  # fmt: skip
     draft.take(shapely.LineString([start, end]).buffer(4.0))
     village = inside(lands[0], one, bay, 14.0)
@@ -153,7 +153,7 @@ def _fort(draft: Draft, w: float, d: float) -> Isle:
     draft.section("The fort")
     high = [draft.number(1.6, 4.5, "wall", k) for k in range(5)]
     ends = [[[-8, -6], [-1.5, -6]], [[1.5, -6], [8, -6]], [[8, -6], [8, 6]], [[8, 6], [-2, 6]], [[-8, 6], [-8, -6]]]
-    draft.make("roofless_walls", node="fort", at=list(at), yaw_deg=draft.number(0, 180, "fort"),
+    draft.make("roofless_walls", node="fort", at=at, yaw_deg=draft.number(0, 180, "fort"),
                stone=draft.material("stone"),
                walls=[{"ends": e, "height_m": h} for e, h in zip(ends, high, strict=True)])  # fmt: skip
     about(draft, "lookout", at, (2.0, 4.6), 5, (2.8, 2.8))

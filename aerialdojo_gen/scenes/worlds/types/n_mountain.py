@@ -42,7 +42,7 @@ class _Massif(NamedTuple):
 def write(draft: Draft) -> None:
     """Raise the mountains, then water, summits and the paths to them, places in the valleys, crags and woods."""
     massif = _TOPOLOGIES[draft.topology](draft, *draft.half, draft.knob("relief_m"))
-    ridges = [{"line": [list(p) for p in c.line], "width_m": c.width_m, "hollow": c.hollow} for c in massif.crests]
+    ridges = [{"line": c.line, "width_m": c.width_m, "hollow": c.hollow} for c in massif.crests]
     bench, rough = draft.number(3.5, 5.5, "bench"), draft.number(1.4, 2.6, "rough")
     draft.step("massif", ridges=ridges, bench_m=bench, rough_m=rough)
     draft.settle()

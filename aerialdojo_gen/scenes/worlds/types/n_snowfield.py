@@ -44,7 +44,7 @@ def _lake(draft: Draft, at: Point, radius_m: float) -> None:
     rng, cracks = draft.rng("cracks"), []
     for k in range(5):
         turns = [math.radians(72.0 * k + 130.0 * j + float(rng.uniform(0, 60))) for j in range(4)]
-        points = [list(point(at[0] + radius_m * math.cos(t), at[1] + radius_m * math.sin(t))) for t in turns]
+        points = [point(at[0] + radius_m * math.cos(t), at[1] + radius_m * math.sin(t)) for t in turns]
         cracks.append({"ribbon": points, "width_m": round(0.1 + 0.04 * k, 2), "within": "lake"})
     draft.paint(cracks, draft.material("crack"))
     n = max(4, round(radius_m * 0.6))
@@ -60,7 +60,7 @@ def _raised(draft: Draft, number: int, facing: shapely.LineString | Point, reach
     draft.section("Huts on stilts")
     walls = draft.shuffled(draft.palette.materials["hut"], "hut")
     cabins = [
-        {"at": list(pose[:2]), "yaw_deg": pose[2], "wall": walls[k % len(walls)],
+        {"at": pose[:2], "yaw_deg": pose[2], "wall": walls[k % len(walls)],
          "size_m": [draft.number(3.8, 4.6, "deep", k), draft.number(6.5, 10, "wide", k), 2.8]}
         for k, pose in enumerate(poses)
     ]  # fmt: skip
@@ -78,7 +78,7 @@ def _gabled(draft: Draft, number: int, way: shapely.LineString | Point, reach_m:
     draft.section("Houses")
     sizes_m = {"deep": (5.5, 7), "wide": (7, 9.6), "high": (3, 4.4)}
     cabins = [
-        {"at": list(pose[:2]), "yaw_deg": pose[2], "wall": draft.material("wall", k),
+        {"at": pose[:2], "yaw_deg": pose[2], "wall": draft.material("wall", k),
          "size_m": [draft.number(*span, key, k) for key, span in sizes_m.items()]}
         for k, pose in enumerate(poses) if k % 2 == 0
     ]  # fmt: skip
@@ -117,7 +117,7 @@ def _ridges(draft: Draft, number: int, along: float | None = None, length_m: flo
         points = [ahead(at, yaw, f * length_m / 2, bend * (1 - abs(f))) for f in (-1, 0, 1)]
         line = shapely.LineString(points)
         if draft.is_free(line.buffer(1.2)):
-            lines.append([list(p) for p in points])
+            lines.append(points)
             draft.take(line.buffer(1.6))
     if lines:
         draft.section("Ridges of broken ice")
@@ -128,7 +128,7 @@ def _slope(draft: Draft, w: float, d: float) -> list[Point]:
     up, top = draft.pick([1, -1], "up"), draft.number(11, 16, "top")
     profile = ((-1.0, 0.0), (-0.7, 0.02), (-0.4, 0.18), (0.3, 0.82), (0.55, 0.95), (1.0, 1.0))
     points = sorted((round(up * y * d, 1), round(z * top, 2)) for y, z in profile)
-    draft.step("profile_slope", profile=[list(p) for p in points], lean=draft.number(-4, 4, "lean") / 100)
+    draft.step("profile_slope", profile=points, lean=draft.number(-4, 4, "lean") / 100)
     ends = point(-w - 1, -up * 0.62 * d), point(w + 1, -up * draft.number(0.54, 0.66, "road") * d)
     road = wilds.winding(draft, "track", ends, 3.0, 3)
     flip = draft.pick([1, -1], "flip")
@@ -144,7 +144,7 @@ def _slope(draft: Draft, w: float, d: float) -> list[Point]:
     pylon = ["ski_lift_pylon", *masts[1], round(towards(masts[1], masts[2]), 1)]
     draft.add({"place": [pylon], "fit": "must"})
     draft.landmarks.append("ski_lift_pylon")
-    draft.lines["lift"] = [list(mast) for mast in masts]
+    draft.lines["lift"] = masts
     draft.make("cableway", masts="lift", cabins=draft.whole(5, 9, "gondolas"))
     draft.make("keep_free", areas=[{"ribbon": "lift", "width_m": 9.0, "round_ends": 16}])
     draft.take(lift.buffer(5.5))
@@ -194,7 +194,7 @@ def _glacier(draft: Draft, w: float, d: float) -> list[Point]:
         if y1 - y0 < 8:
             continue
         bend = draft.number(-3, 3, "bend", k)
-        points = [list(point(u, v)) for u, v in ((x, y0), (x + bend, (y0 + y1) / 2), (x, y1))]
+        points = [point(u, v) for u, v in ((x, y0), (x + bend, (y0 + y1) / 2), (x, y1))]
         deep = draft.number(1.6, 3, "deep", k)
         draft.step("sink_area", area={"ribbon": points, "width_m": 3.4}, depth_m=deep, blend_m=1.2)
         draft.paint({"ribbon": points, "width_m": 2.8}, draft.material("crack"))

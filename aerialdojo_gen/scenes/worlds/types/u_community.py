@@ -11,7 +11,7 @@ import shapely
 from aerialdojo_gen.scenes.worlds.blocks import lane_streets
 from aerialdojo_gen.scenes.worlds.draft import Draft, NoRoomError
 from aerialdojo_gen.scenes.worlds.shapes import SIDES, Box, Point, Pose, ahead, beside, point, pose_on, towards
-from aerialdojo_gen.scenes.worlds.wilds import strewn
+from aerialdojo_gen.scenes.worlds.wilds import strewn, trees
 
 _STOREY_M, _PITCH_M = 3.2, 6.4  # Of flats and of their balconies
 _NAMES = "ABCDEFGHIJKL"
@@ -55,15 +55,7 @@ def write(draft: Draft) -> None:
     strewn(draft, "garden", 44, (3.8, 3.8), 3.0)
     draft.fill_slots()
     draft.section("Trees")
-    trees, limit = draft.material("trees").split("+"), round(draft.knob("trees"))
-    pattern = {
-        "of": trees,
-        "scatter": draft.site.grown(-2).rounded(),
-        "spacing_m": 7,
-        "limit": limit,
-        "stream": "trees",
-    }
-    draft.add({"pattern": pattern, "fit": "skip"})
+    trees(draft, draft.site.grown(-2).rounded(), 7, round(draft.knob("trees")), "trees", fit="skip")
 
 
 def _bays(draft: Draft, at: Point, yaw: float, count: int) -> None:
@@ -89,7 +81,7 @@ def _flats(draft: Draft, pose: Pose, long_m: float, k: int) -> Point | None:
         return None
     storeys, name = max(3, round(draft.knob("storeys")) - draft.whole(0, 2, "storeys", k)), f"block {_NAMES[k % 12]}"
     draft.make(
-        "flats", at=list(pose[:2]), yaw_deg=pose[2], size_m=[long_m, deep], storeys=storeys, name=name,
+        "flats", at=pose[:2], yaw_deg=pose[2], size_m=[long_m, deep], storeys=storeys, name=name,
         wall=draft.material("wall", k), band=draft.material("band", k), paving=draft.material("plaza"),
         **{"as": f"roof_{k}"},
     )  # fmt: skip
@@ -116,8 +108,7 @@ def _paths(draft: Draft, fronts: Sequence[Point], middle: Point) -> None:
     """Lead paths from the doors to the middle of the garden, benches beside them."""
     path, radius = draft.material("path"), draft.number(5.5, 8.0, "plaza")
     lines = [shapely.LineString([front, middle]) for front in fronts]
-    ways = [[list(front), list(middle)] for front in fronts]
-    draft.paint([{"ribbon": way, "width_m": 2.2, "round_ends": True} for way in ways], path)
+    draft.paint([{"ribbon": [front, middle], "width_m": 2.2, "round_ends": True} for front in fronts], path)
     draft.paint({"disc": [*middle, radius]}, draft.material("plaza"))
     for n, line in enumerate(lines):
         for k in range(int((line.length - radius) // 6.0)):

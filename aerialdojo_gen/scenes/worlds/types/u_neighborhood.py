@@ -155,8 +155,7 @@ def _mirrored(draft: Draft, *points: Point) -> list[Point]:
 
 
 def _straight(draft: Draft, paths: dict[str, list[Point]]) -> list[Way]:
-    lines = [[list(p) for p in path] for path in paths.values()]
-    return streets(draft, lines, [shapely.LineString(path) for path in paths.values()])
+    return streets(draft, [*paths.values()], [shapely.LineString(path) for path in paths.values()])
 
 
 def _green(draft: Draft, box: Box) -> list[Pose]:
@@ -184,7 +183,7 @@ def _culdesac(draft: Draft, w: float, d: float) -> Layout:
     draft.paint({"disc": [cx, cy, radius + 1.8]}, draft.material("pavement"), rise_m=0.12)
     ways = _straight(draft, {"road": points[:2], "lane": [points[2], (cx, cy - up * (radius - 1.0))]})
     street = draft.material("street")
-    draft.paint([{"disc": [cx, cy, radius]}, {"ribbon": [list(points[2]), [cx, cy]], "width_m": 6.0}], street)
+    draft.paint([{"disc": [cx, cy, radius]}, {"ribbon": [points[2], (cx, cy)], "width_m": 6.0}], street)
     draft.paint({"disc": [cx, cy, 4.9]}, draft.material("green"), rise_m=0.12)
     ring = shapely.Point(cx, cy).buffer(radius + 0.4).difference(shapely.Point(cx, cy).buffer(5.1))
     draft.take(ring)
@@ -233,7 +232,7 @@ def _crescent(draft: Draft, w: float, d: float) -> Layout:
     middle = line.interpolate(line.length * draft.number(0.4, 0.6, "link"))
     side = draft.pick([-1, 1], "side")
     link = [(round(middle.x, 1), round(middle.y, 1)), (round(middle.x + draft.number(-6, 6, "lean"), 1), side * d)]
-    return streets(draft, ["crescent", [list(p) for p in link]], [line, shapely.LineString(link)]), []
+    return streets(draft, ["crescent", link], [line, shapely.LineString(link)]), []
 
 
 def _terraces(draft: Draft, w: float, d: float) -> Layout:
@@ -269,7 +268,7 @@ def _terrace(
         for k, role in enumerate(roles)
     ]  # fmt: skip
     houses = [{key: value for key, value in house.items() if value != ""} for house in houses]
-    draft.make("terrace", at=list(at), yaw_deg=yaw, houses=houses, name=name, pitch_m=6.4)
+    draft.make("terrace", at=at, yaw_deg=yaw, houses=houses, name=name, pitch_m=6.4)
     half, behind, before = n * 3.2 + 0.5, 10.4, 7.6
     y0, y1 = (at[1] - before, at[1] + behind) if yaw < 0 else (at[1] - behind, at[1] + before)
     draft.take(shapely.box(at[0] - half, y0, at[0] + half, y1))
@@ -281,7 +280,7 @@ def _courts(draft: Draft, w: float, d: float) -> Layout:
     walks = []
     for k, x in enumerate((-w / 2, w / 2)):
         path = [(round(x, 1), road + HALF_M), (round(x + draft.number(-3, 3, k), 1), d - 6.0)]
-        draft.paint({"ribbon": [list(p) for p in path], "width_m": 2.4}, draft.material("path"))
+        draft.paint({"ribbon": path, "width_m": 2.4}, draft.material("path"))
         draft.paint({"disc": [*path[1], 5.2]}, draft.material("path"))
         line = shapely.LineString(path)
         draft.take(line.buffer(1.5, cap_style="flat"))
