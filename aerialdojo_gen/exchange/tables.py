@@ -9,9 +9,8 @@ from typing import Any
 
 import pyarrow as pa
 
-from aerialdojo_gen.store.parquet_files import write_file
 from aerialdojo_gen.store.schemas import RELEASE_OBJECTS, ROUTES, TASKS, TableSpec
-from aerialdojo_gen.store.tables import check_table, from_rows
+from aerialdojo_gen.store.tables import check_table, from_rows, write_file
 
 _ROWS_A_PART = 8192
 _POSES_A_PART = 1 << 17
