@@ -103,12 +103,8 @@ OBJECT_COLUMNS = [
     column("object_id", pa.int32(), "id of the target object within its scene"),
     column("name", pa.string(), "what a person would call it, e.g. red delivery van"),
     column("category", pa.string(), "semantic category, one of the catalogue's"),
-    column(
-        "description",
-        pa.string(),
-        "what it looks like and what stands by it, as a person wrote it; else the first paraphrase, in the release",
-        nullable=True,
-    ),
+    column("description", pa.string(), "what it looks like and what stands by it, as a person wrote it; else the "
+           "first paraphrase, in the release", nullable=True),
     column("mesh_node", pa.string(), "node of the scene's mesh"),
     *xyz("centre of the object's axis-aligned box"),
     *[column(f"size_{a}_m", pa.float64(), f"extent of the box along {a}", "m") for a in "xyz"],
@@ -117,17 +113,10 @@ OBJECT_COLUMNS = [
     column(
         "claims", pa.string(), "what can be said of it, true of the mesh: a JSON list of claims (kind, key, things)",
     ),
-    column(
-        "shape",
-        pa.string(),
-        "digest of its geometry in its own frame: congruent things of the catalogue have the "
-        "same; null of imported meshes",
-        nullable=True,
-    ),
-    column(
-        "shape_held_out", pa.bool_(),
-        "whether its design stands in no scene of the training side; null of imported meshes", nullable=True,
-    ),
+    column("shape", pa.string(), "digest of its geometry in its own frame: congruent things of the catalogue have "
+           "the same; null of imported meshes", nullable=True),
+    column("shape_held_out", pa.bool_(),
+           "whether its design stands in no scene of the training side; null of imported meshes", nullable=True),
 ]  # fmt: skip
 REFERENCE = [
     column("reference_image", pa.binary(), "PNG: front view from the selected anchor, or from further back "
