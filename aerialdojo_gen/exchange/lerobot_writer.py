@@ -20,9 +20,9 @@ from aerialdojo_gen.exchange.folder import link_or_copy, write_json
 from aerialdojo_gen.exchange.samples import ExportOptions, Part, SampleFrames
 from aerialdojo_gen.geometry.motion import DISPLACEMENTS, TURN_RAD
 from aerialdojo_gen.learning.labels import labels_at
-from aerialdojo_gen.store.parquet_files import read_file, write_file
 from aerialdojo_gen.store.root import DataRoot
 from aerialdojo_gen.store.schemas import STOP, TURN_LEFT, TURN_RIGHT
+from aerialdojo_gen.store.tables import read_file, write_file
 
 # Steps have no duration: a frame a step, at the rate of the recordings.
 FPS = 15

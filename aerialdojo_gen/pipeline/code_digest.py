@@ -30,8 +30,8 @@ CUT = (
     "base.version", "cli", "pipeline", "store",
 )  # fmt: skip
 # Parts of those that make rows, or write those of every stage.
-_WRITERS = ("store.parquet_files", "store.tables")
-KEPT = ("pipeline.scoring", "pipeline.stage", "pipeline.stages.work", *_WRITERS)
+_WRITER = "store.tables"
+KEPT = ("pipeline.scoring", "pipeline.stage", "pipeline.stages.work", _WRITER)
 
 # What modules import by a name made at run time: libraries, or a folder of this package with all its modules ("x.*").
 # Empty: the configuration names it, or it imports what the module's callers import themselves.
@@ -95,7 +95,7 @@ def code_of(module: str, idle: tuple[str, ...] = ()) -> Code:
     """Return the code that a module depends on, but for `idle` imports, as of the first call in this process."""
     found: set[str] = set()
     libraries: set[str] = set()
-    waiting = [module, *(f"{_NAME}.{name}" for name in _WRITERS)]
+    waiting = [module, f"{_NAME}.{_WRITER}"]
     while waiting:
         name = waiting.pop()
         if name in found or name in idle:

@@ -138,7 +138,7 @@ def _verified(stage: Stage, data: DataRoot, scene: str, part: int, reporter: Rep
     """Whether the files of a fresh shard have the digests that the rows of `recordings` say."""
     if "recordings" not in stage.writes:
         return True
-    from aerialdojo_gen.store.parquet_files import read_file
+    from aerialdojo_gen.store.tables import read_file
 
     try:
         name = store.shard_name("recordings", scene, part)

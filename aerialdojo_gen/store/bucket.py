@@ -13,11 +13,10 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from email.utils import parsedate_to_datetime
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from aerialdojo_gen.base.environment_errors import number_of
 from aerialdojo_gen.base.errors import MissingPackage, StoreError, first_line, no_package
@@ -108,16 +107,14 @@ def cloud_error(error: Exception, url: str, endpoint: str | None) -> Exception |
     return None
 
 
-@dataclass(frozen=True)
-class Entry:
+class Entry(NamedTuple):
     """An object as a listing has it: bytes, and the tag that changes with them."""
 
     size: int
     etag: str
 
 
-@dataclass(frozen=True)
-class Content:
+class Content(NamedTuple):
     """A small object, read whole; `age_s` is the time since it was written, by the store's own clock."""
 
     data: bytes
@@ -134,12 +131,6 @@ class Bucket:
             self._client = _made_client(os.getpid())
         self.endpoint = str(self._client.meta.endpoint_url)
 
-    def read(self, key: str, begin: int, end: int, etag: str) -> bytes:
-        """Read an object's bytes from `begin` to before `end`, of the version with this tag."""
-        blocks: list[bytes] = []
-        self._fetch(key, blocks.append, begin, end, etag, whole=False)
-        return b"".join(blocks)
-
     def read_small(self, key: str) -> Content:
         """Read an object with its tag and its age."""
         with self._location(key):
@@ -149,30 +140,28 @@ class Bucket:
         now = parsedate_to_datetime(date).timestamp() if date else time.time()
         return Content(data, answer["ETag"], now - float(answer["LastModified"].timestamp()))
 
-    def download(self, key: str, write: Write, entry: Entry) -> None:
-        """Give an object's blocks to a function; where the connection drops, the rest is asked for."""
-        self._fetch(key, write, 0, entry.size, entry.etag, whole=True)
-
-    def _fetch(self, key: str, write: Write, begin: int, end: int, etag: str, *, whole: bool) -> None:
-        at, tries = begin, 0
-        while at < end:
+    def download(self, key: str, write: Write, entry: Entry, begin: int = 0, end: int | None = None) -> None:
+        """Give an object's blocks, or a part's, to a function; where the connection drops, the rest is asked for."""
+        at, end = begin, entry.size if end is None else end
+        for tries in range(_TRIES):
+            if at >= end:
+                return
+            if tries:
+                time.sleep(min(0.1 * 2.0**tries, 10.0))
             # Of a whole object the client compares the checksum that the store has of it.
-            part = {} if whole and at == 0 else {"Range": f"bytes={at}-{end - 1}"}
+            part = {} if (at, end) == (0, entry.size) else {"Range": f"bytes={at}-{end - 1}"}
             with self._location(key):
                 # The client itself tries again until an answer begins; what breaks off later is tried again here.
-                answer = self._client.get_object(Bucket=self.name, Key=key, IfMatch=etag, **part)
+                answer = self._client.get_object(Bucket=self.name, Key=key, IfMatch=entry.etag, **part)
                 try:
                     for block in answer["Body"].iter_chunks(_BLOCK):
                         write(block)
                         at += len(block)
                 except Exception as error:
-                    if not is_transient(error) or tries + 1 >= _TRIES:
+                    if not is_transient(error) or tries + 1 == _TRIES:
                         raise
-            tries += 1
-            if at < end:
-                if tries >= _TRIES:
-                    raise StoreError(f"s3://{self.name}/{key} ends at {at:,} bytes of {end:,}: run the command again")
-                time.sleep(min(0.1 * 2.0**tries, 10.0))
+        if at < end:
+            raise StoreError(f"s3://{self.name}/{key} ends at {at:,} bytes of {end:,}: run the command again")
 
     def head(self, key: str) -> tuple[Entry, Mapping[str, str]]:
         """Return an object's entry, and what was said with it when it was put."""

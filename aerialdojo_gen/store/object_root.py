@@ -277,8 +277,9 @@ class _Ranges(io.RawIOBase):
         end = min(self._at + len(buffer), self._entry.size)
         if end <= self._at:
             return 0
+        data = bytearray()
         try:
-            data = self._bucket.read(self._key, self._at, end, self._entry.etag)
+            self._bucket.download(self._key, data.extend, self._entry, self._at, end)
         except Changed:
             raise StoreError(f"{self._url} was replaced while it was read: run the command again") from None
         buffer[: len(data)] = data

@@ -164,8 +164,7 @@ class LocalRoot(DataRoot):
         """Paths of what in a folder matches a glob."""
         if "/" not in pattern and "**" not in pattern:
             # A run asks some thousand times what shards a scene has: pathlib takes five times as long.
-            plain = folder and not folder.endswith("/") and "." not in folder and "//" not in folder
-            place = folder if plain else PurePosixPath(folder).as_posix()
+            place = PurePosixPath(folder).as_posix()
             prefix = "" if place == "." else f"{place}/"
             try:
                 names = os.listdir(self._path_text(folder))

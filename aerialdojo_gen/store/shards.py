@@ -46,8 +46,7 @@ def write_shard(
 ) -> Path:  # fmt: skip
     """Check a table, write it as a shard, and give it its name when it is whole."""
     # Here alone, as in the other functions: half of what importing Arrow takes is what works on rows.
-    from aerialdojo_gen.store.parquet_files import write_clustered
-    from aerialdojo_gen.store.tables import check_table, column_digests, content_digest
+    from aerialdojo_gen.store.tables import check_table, column_digests, content_digest, write_clustered
 
     spec = LAYOUT[table_name].spec
     table = check_table(spec, table)
@@ -78,7 +77,7 @@ def read_info(data: Where, name: str) -> ShardInfo:
 @lru_cache(maxsize=8192)
 def _read_info(root: DataRoot, name: str, version: str) -> ShardInfo:
     # A shard is never written to, only replaced; a run asks for the same footer half a dozen times.
-    from aerialdojo_gen.store.parquet_files import read_footer
+    from aerialdojo_gen.store.tables import read_footer
 
     where, hint = root.at(name), "delete it and run the command again"
     try:
@@ -154,8 +153,7 @@ def _read_shard(
     root: DataRoot, table: str, scene: str, name: str, info: ShardInfo, columns: Sequence[str]
 ) -> pa.Table:
     """Read columns of a shard, and compare them with the digests in its footer."""
-    from aerialdojo_gen.store.parquet_files import read_file
-    from aerialdojo_gen.store.tables import column_digests
+    from aerialdojo_gen.store.tables import column_digests, read_file
 
     where, hint = root.at(name), _hint(table, scene)
     try:

@@ -28,7 +28,7 @@ CALL = "from aerialdojo_gen.base.kernel import kernel; print(kernel())"
 PACK = """
 import sys
 from pathlib import Path
-from aerialdojo_gen.pipeline.executors.bundled import pack
+from aerialdojo_gen.pipeline.executors.ray_worker import pack
 pack(Path(sys.argv[1]), [])
 """
 # What a run says that it compiles, before and after.

@@ -36,7 +36,7 @@ from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.planning.flight_space import FlightSpace
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store.schemas import APPROACH, MOVE_UP_1, STOP
-from aerialdojo_gen.store.schemas.columns import list_of
+from aerialdojo_gen.store.schemas.staged import list_of
 
 CAMERAS = Sensors(("front", "left", "right"), rgb=False, width=48, height=48)
 

@@ -47,7 +47,7 @@ from aerialdojo_gen.planning.flight_space import FlightSpace
 from aerialdojo_gen.planning.planner import Planner
 from aerialdojo_gen.store.root import open_root
 from aerialdojo_gen.store.schemas import STOP, TURN_LEFT, TURN_RIGHT
-from aerialdojo_gen.store.schemas.columns import list_of
+from aerialdojo_gen.store.schemas.staged import list_of
 
 torch = pytest.importorskip("torch", reason="PyTorch is not installed: it is the extra 'train'")
 

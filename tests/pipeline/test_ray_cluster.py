@@ -23,7 +23,7 @@ from aerialdojo_gen.benchmark.evaluation import Evaluation
 from aerialdojo_gen.benchmark.runner import evaluate
 from aerialdojo_gen.benchmark.tasks import Selection
 from aerialdojo_gen.imports.worlds import VaryOptions, vary
-from aerialdojo_gen.pipeline.executors import bundled, ray_worker
+from aerialdojo_gen.pipeline.executors import ray_worker
 from aerialdojo_gen.pipeline.registry import STAGES
 from aerialdojo_gen.store.staging import AREA
 
@@ -189,12 +189,12 @@ def test_a_secret_is_in_no_text():
 def test_what_travels_is_the_same_bytes_and_comes_to_its_place(tmp_path, project):
     pack = tmp_path / "a.zip"
     folders = [project / "scene_assets", project / "annotations" / "smoke"]
-    bundled.pack(pack, folders)
-    bundled.pack(tmp_path / "b.zip", folders)
+    ray_worker.pack(pack, folders)
+    ray_worker.pack(tmp_path / "b.zip", folders)
     assert pack.read_bytes() == (tmp_path / "b.zip").read_bytes()
     with zipfile.ZipFile(pack) as archive:
         archive.extractall(tmp_path / "there")
-    unpacked = bundled.Unpacked(tmp_path / "there")
+    unpacked = ray_worker.Unpacked(tmp_path / "there")
     for folder in (*folders, project / "scene_assets" / "smoke"):
         names = {p.relative_to(folder) for p in folder.rglob("*") if p.is_file()}
         there = unpacked.place(folder)
@@ -205,9 +205,9 @@ def test_what_travels_is_the_same_bytes_and_comes_to_its_place(tmp_path, project
 
 def test_what_is_too_large_to_travel_is_one_line(tmp_path):
     with (tmp_path / "large.glb").open("wb") as file:
-        file.truncate(bundled.MAX_BYTES + 1)
+        file.truncate(ray_worker.MAX_BYTES + 1)
     with pytest.raises(UsageError, match=r"have 2\d\d MB: no more than 200 MB are sent"):
-        bundled.pack(tmp_path.parent / "never.zip", [tmp_path])
+        ray_worker.pack(tmp_path.parent / "never.zip", [tmp_path])
 
 
 @pytest.mark.nightly

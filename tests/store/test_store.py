@@ -21,8 +21,14 @@ from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.atomic import atomic_file
 from aerialdojo_gen.store.footers import ShardFile, ShardInfo, _checksum, decode, encode
-from aerialdojo_gen.store.parquet_files import read_file, read_footer, write_clustered
-from aerialdojo_gen.store.tables import check_table, content_digest, from_rows
+from aerialdojo_gen.store.tables import (
+    check_table,
+    content_digest,
+    from_rows,
+    read_file,
+    read_footer,
+    write_clustered,
+)
 
 finite = st.floats(-1e6, 1e6)
 

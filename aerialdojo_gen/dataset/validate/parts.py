@@ -15,10 +15,9 @@ from aerialdojo_gen.dataset.contents import FOLDER, SHARDS, part_name
 from aerialdojo_gen.dataset.validate.registry import Outcome
 from aerialdojo_gen.dataset.validate.rows import Rows
 from aerialdojo_gen.store import shards as store
-from aerialdojo_gen.store.parquet_files import read_file
 from aerialdojo_gen.store.root import DataRoot, LocalRoot, Where, open_root
 from aerialdojo_gen.store.schemas import TableSpec
-from aerialdojo_gen.store.tables import content_digest
+from aerialdojo_gen.store.tables import content_digest, read_file
 
 # Other files of a release: cards, licence, files of a hub's client, pictures.
 _OTHER_FILES = {

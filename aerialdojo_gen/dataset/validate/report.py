@@ -16,7 +16,7 @@ from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.base.text_table import Column, TextTable
 from aerialdojo_gen.dataset.validate.registry import Fault, Outcome
 from aerialdojo_gen.store.atomic import atomic_file
-from aerialdojo_gen.store.parquet_files import write_file
+from aerialdojo_gen.store.tables import write_file
 
 FORMATS = (".jsonl", ".json", ".csv", ".parquet")
 

@@ -24,9 +24,8 @@ from typing import Any
 
 from aerialdojo_gen.base.errors import AerialDojoError, MissingPackage, UsageError, first_line, no_package
 from aerialdojo_gen.pipeline.executors.base import Executor, ParentChannel, R, SharedPaths, T, TaskQueue
-from aerialdojo_gen.pipeline.executors.bundled import pack
 from aerialdojo_gen.pipeline.executors.local import own_cores
-from aerialdojo_gen.pipeline.executors.ray_worker import Expected, MessageBoard, Worker, listing, versions
+from aerialdojo_gen.pipeline.executors.ray_worker import Expected, MessageBoard, Worker, listing, pack, versions
 from aerialdojo_gen.store.staging import scratch_folder, staged
 
 # Attempts of a task before its failure is final.

@@ -17,7 +17,6 @@ from aerialdojo_gen.base.constants import (
     VIEWS,
 )
 from aerialdojo_gen.store.schemas.benchmark import EPISODES, FAILURES, STEPS, TIMINGS
-from aerialdojo_gen.store.schemas.columns import TableSpec
 from aerialdojo_gen.store.schemas.release import (
     DIFFICULTY_COLUMNS,
     RELEASE_ANCHORS,
@@ -41,6 +40,7 @@ from aerialdojo_gen.store.schemas.staged import (
     STAGED,
     VERDICTS,
     VIEWPOINTS,
+    TableSpec,
 )
 
 # Tables that stages write for each other, by name.

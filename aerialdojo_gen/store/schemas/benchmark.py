@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pyarrow as pa
 
-from aerialdojo_gen.store.schemas.columns import EUCLIDEAN, SCENE, column, table, xyz
 from aerialdojo_gen.store.schemas.release import TASKS
+from aerialdojo_gen.store.schemas.staged import EUCLIDEAN, SCENE, column, table, xyz
 
 RUN = column("run_id", pa.string(), "name of the evaluation run")
 TASK_ID = column("task_id", pa.string(), "the task instance")

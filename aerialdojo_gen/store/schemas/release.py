@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import pyarrow as pa
 
-from aerialdojo_gen.store.schemas.columns import (
+from aerialdojo_gen.store.schemas.staged import (
     AGENT_ACTION,
+    ANCHOR_COLUMNS,
     CLEARANCE,
     DETOUR,
     DIFFICULTY,
     EUCLIDEAN,
     LISTS,
+    OBJECT_COLUMNS,
     PAIR,
+    PARAPHRASE,
+    REFERENCE,
     ROUTE,
     SCENE,
     SETTING,
@@ -21,7 +25,6 @@ from aerialdojo_gen.store.schemas.columns import (
     table,
     xyz,
 )
-from aerialdojo_gen.store.schemas.staged import ANCHOR_COLUMNS, OBJECT_COLUMNS, PARAPHRASE, REFERENCE
 
 RELEASE_ANCHORS = table("anchors", ["scene", "object_id", "anchor_id"], *ANCHOR_COLUMNS)
 

@@ -24,7 +24,7 @@ from aerialdojo_gen.pipeline.stages.work.candidate_policy import (
 )
 from aerialdojo_gen.scenes.worlds.world import is_world, world_of
 from aerialdojo_gen.store.schemas import RELEASE_ANCHORS, RELEASE_OBJECTS, ROUTES, TASKS
-from aerialdojo_gen.store.schemas.columns import DIFFICULTY, START_VIEW
+from aerialdojo_gen.store.schemas.staged import DIFFICULTY, START_VIEW
 
 _POSE = ("x_m", "y_m", "z_m", "yaw_rad")
 _LISTS = (*_POSE, "action", "agent_action")
