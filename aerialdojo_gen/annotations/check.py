@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Iterator, Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -32,11 +34,12 @@ class SourceCheck:
 
     def __init__(self, source: Source, vocabulary: Vocabulary, counts: tuple[int, int] | None = None) -> None:
         self._source, self._scene, self._vocabulary = source, vocabulary.scene, vocabulary
-        self._fault, self._raw = source.document.fault, source.document.value
+        self._fault, raw = source.document.fault, source.document.value
+        self._raw: dict[str, Any] = raw if isinstance(raw, dict) else {}
         self._known = sorted({*vocabulary.names, *(instance.category for instance in self._scene.instances)})
         self.claims: SceneClaims | None = None  # None where the landmarks are at fault
         self.unchecked: dict[int, list[str]] = {}  # Words of texts that match no claim, by the object's index
-        found = () if self._raw is None else self._find(counts)
+        found = () if raw is None else self._find(counts)
         self.faults = sorted(dict.fromkeys([*source.faults, *found]), key=lambda fault: fault.line)
 
     def _find(self, counts: tuple[int, int] | None) -> Iterator[Fault]:
@@ -44,7 +47,8 @@ class SourceCheck:
         if source.scene and source.scene != scene.name:
             yield self._fault(("scene",), f"is {source.scene!r}, the scene is {scene.name!r}")
         for key, expected in zip(("landmarks", "objects"), counts or (), strict=False):
-            found = len(self._raw[key]) if isinstance(self._raw, dict) and isinstance(self._raw.get(key), list) else 0
+            entries = self._raw.get(key)
+            found = len(entries) if isinstance(entries, list) else 0
             if found != expected:
                 yield self._fault((key,), f"there are {found}; the paper's inventory has {expected}")
         yield from self._unique()
@@ -61,15 +65,13 @@ class SourceCheck:
             ("landmarks", landmarks, ("id", "name", "node")),
             ("objects", objects, ("id", "node")),
         )
+        first: dict[tuple[object, ...], int] = {}
         for kind, members, keys in entries:
-            for key in keys:
-                first: dict[object, int] = {}
-                for i, entry in members.items():
-                    value = getattr(entry, key)
-                    value = value.strip().lower() if key == "name" else value
-                    if value in first:
-                        yield self._fault((kind, i, key), f"{value!r} is the {key} of {kind}[{first[value]}] already")
-                    first.setdefault(value, i)
+            for key, (i, entry) in itertools.product(keys, members.items()):
+                value = getattr(entry, key)
+                value = value.strip().lower() if key == "name" else value
+                if (other := first.setdefault((kind, key, value), i)) != i:
+                    yield self._fault((kind, i, key), f"{value!r} is the {key} of {kind}[{other}] already")
         landmark_nodes = {entry.node: i for i, entry in landmarks.items()}
         for i, item in objects.items():
             if item.node in landmark_nodes:
@@ -110,10 +112,8 @@ class SourceCheck:
         source, scene = self._source, self._scene
         landmarks = sorted(source.landmarks.values(), key=lambda entry: entry.id)
         nodes = [landmark.node for landmark in landmarks]
-        raw = self._raw.get("landmarks") if isinstance(self._raw, dict) else None
-        if not isinstance(raw, list) or len(nodes) < len(raw) or len(set(nodes)) < len(nodes):
-            return
-        if not all(node in scene for node in nodes):
+        raw = self._raw.get("landmarks")
+        if not isinstance(raw, list) or len({node for node in nodes if node in scene}) < len(raw):
             return
         if not nodes:
             if source.objects:
@@ -140,10 +140,9 @@ class SourceCheck:
                 continue
             yield from self._description(matcher, k, entry, bearing)
             same = (entry.name.lower(), bearing, entry.description.lower())
-            if same in described:
-                text = f"name, landmark, direction and description are those of objects[{described[same]}]"
+            if (other := described.setdefault(same, k)) != k:
+                text = f"name, landmark, direction and description are those of objects[{other}]"
                 yield self._fault(("objects", k, "description"), text)
-            described.setdefault(same, k)
 
     def _description(self, matcher: Matcher, k: int, entry: Object, bearing: Bearing) -> Iterator[Fault]:
         """Check a person's text: what is matched to claims must be so, and fit one thing."""

@@ -54,11 +54,11 @@ BY_NAME: dict[str, tuple[str, ...]] = {
 
 # Files that modules read, relative to the package. Files outside it are sources of stages.
 DATA_FILES = {
-    "annotations.language.grammar": "annotations/language/*.toml",
-    "annotations.phrases": "annotations/phrases/*.toml",
-    "annotations.places": "annotations/places/*.toml",
-    "annotations.words": "annotations/words.toml",
-    "scenes.colours": "scenes/colour_names.toml",
+    "annotations.language.locations": ("annotations/language/relations.toml",),
+    "annotations.language.sentences": ("annotations/language/grammar.toml",),
+    "annotations.phrases": ("annotations/phrases/*.toml", "annotations/words.toml"),
+    "annotations.places": ("annotations/places/*.toml",),
+    "scenes.colours": ("scenes/colour_names.toml",),
 }
 
 # Distributions that provide an import of another name.
@@ -108,9 +108,9 @@ def code_of(module: str, idle: tuple[str, ...] = ()) -> Code:
     parts = {
         name: _source_digest(name) for name in sorted(found | {above for name in found for above in _above(name)})
     }
-    for name, pattern in DATA_FILES.items():
+    for name, patterns in DATA_FILES.items():
         if f"{_NAME}.{name}" in found:
-            for path in sorted(_FOLDER.glob(pattern)):
+            for path in sorted(path for pattern in patterns for path in _FOLDER.glob(pattern)):
                 parts[path.relative_to(_FOLDER).as_posix()] = hashlib.sha256(path.read_bytes()).hexdigest()
     return Code(parts, {name: _version(name) for name in sorted(libraries)})
 

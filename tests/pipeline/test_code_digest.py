@@ -119,8 +119,11 @@ def test_what_is_cut_or_kept_exists():
     for name in (*code_digest.CUT, *code_digest.KEPT, *code_digest.DATA_FILES):
         path = SOURCES.joinpath(*name.split("."))
         assert path.is_dir() or path.with_suffix(".py").is_file(), name
-    for pattern in code_digest.DATA_FILES.values():
-        assert list(SOURCES.glob(pattern)), pattern
+    named = {
+        pattern: {*SOURCES.glob(pattern)} for patterns in code_digest.DATA_FILES.values() for pattern in patterns
+    }
+    assert all(named.values()), named
+    assert {*SOURCES.glob("annotations/**/*.toml")} <= set().union(*named.values())
 
 
 def test_another_number_of_shards_or_another_source_makes_a_scene_stale(project, smoke, tmp_path):

@@ -44,18 +44,22 @@ _OF_TASK = (
 )  # fmt: skip
 
 
-def _known(rows: Rows, *names: str) -> Mask:
+def _known(rows: Rows, names: Sequence[str]) -> Mask:
     """Which of some columns every row says, (n, columns) bool."""
     return np.column_stack([rows.valid(name) for name in names])
 
 
+def _silent(rows: Rows, names: Sequence[str]) -> Iterator[Finding]:
+    """Rows that do not say all of some columns, where any row says any."""
+    known = _known(rows, names)
+    for row in np.flatnonzero(known.any() & ~known.all(axis=1)).tolist():
+        yield Finding(row, f"no {names[int(known[row].argmin())]}", f"a value, as other {rows.name} have")
+
+
 @check("routes", after=_OF_ROUTE)
-def difficulty_told(data: SceneData, rows: Rows) -> Iterator[Finding]:
+def difficulty_told(_data: SceneData, rows: Rows) -> Iterator[Finding]:
     """Every route says how hard it is, unless an older version wrote the release and none does."""
-    names = [name for name in DIFFICULTY_COLUMNS if name != "visible_view_at_start"]
-    known = _known(rows, *names)
-    for row in np.flatnonzero(known.any() & ~known.all(axis=1)):
-        yield Finding(int(row), f"no {names[int(known[row].argmin())]}", "a value, as other routes of the scene have")
+    yield from _silent(rows, [name for name in DIFFICULTY_COLUMNS if name != "visible_view_at_start"])
 
 
 @check("routes", after=(*_OF_ROUTE, "difficulty_told"))
@@ -234,7 +238,7 @@ def split_by_objects(data: SceneData, rows: Rows) -> Iterator[Finding]:
     # One id says whether the release was made with this salt.
     made = [nav_id(data.scene, pair, key) for pair in routes.pairs()[:1]]
     out = held_out(data.scene, ids, fraction, key) if made == routes.texts("nav_id")[:1].tolist() else None
-    complete = _known(rows, *_SPLITS).all(axis=1)
+    complete = _known(rows, _SPLITS).all(axis=1)
     split = rows.texts("target_split")
     is_held_out = {end: rows.floats(f"{end}_held_out") for end in ("target", "start")}
     ends = {end: at(routes.ints(f"{end}_object_id"), data.route_of_task).tolist() for end in is_held_out}
@@ -255,8 +259,6 @@ def split_by_objects(data: SceneData, rows: Rows) -> Iterator[Finding]:
 @check("tasks")
 def splits_told(_data: SceneData, rows: Rows) -> Iterator[Finding]:
     """Every task says on which sides of the splits it is, unless an older version wrote the release and none does."""
-    known = _known(rows, *_SPLITS)
-    if not known.any():
+    if not _known(rows, _SPLITS).any():
         raise UncheckedError("the release does not say: an older version wrote it")
-    for row in np.flatnonzero(~known.all(axis=1)):
-        yield Finding(int(row), f"no {_SPLITS[int(known[row].argmin())]}", "a value, as other tasks have")
+    yield from _silent(rows, _SPLITS)
