@@ -41,8 +41,8 @@ class Evaluation:
     withheld: bool = False  # Fly also where the release has no routes: for a submission, scored elsewhere
 
     def __post_init__(self) -> None:
-        """Check the names of hints."""
-        check_hints(self.hints)
+        """Check the names of hints, and put them in order."""
+        object.__setattr__(self, "hints", check_hints(self.hints))
 
     @property
     def label(self) -> str:
@@ -52,8 +52,7 @@ class Evaluation:
     def identity(self) -> dict[str, str]:
         """Columns of `episodes` that identify the run, its agent and its hints."""
         options = json.dumps(self._logged(self.options if self.used is None else self.used), sort_keys=True)
-        hints = ",".join(check_hints(self.hints))
-        return {"run_id": self.run, "agent": self.agent, "agent_options": options, "told": hints}
+        return {"run_id": self.run, "agent": self.agent, "agent_options": options, "told": ",".join(self.hints)}
 
     def flight_of(self, agent: Any, data: DataRoot) -> Flight:
         """Make the flight of an agent, by its own sensors where these settings have none."""
@@ -69,7 +68,7 @@ class Evaluation:
             **asdict(self.selection),
             "sensors": asdict(self.sensors) if self.sensors else None,
             "renderer": self.renderer,
-            "tell": check_hints(self.hints),
+            "tell": self.hints,
             "embodiment": self.embodiment.model_dump(),
         }
 

@@ -96,11 +96,8 @@ def replays(
     root = open_root(data)
     steps = {run.name: read_run(log, run.name, "steps") for run in runs if tasks}
     for task_id in tasks:
-        flown = []
-        for run in runs:
-            rows = run.table.filter(pc.equal(run.table["task_id"], task_id)).to_pylist()
-            if rows:
-                flown.append((run, rows[0]))
+        chosen = ((run, run.table.filter(pc.equal(run.table["task_id"], task_id)).to_pylist()) for run in runs)
+        flown = [(run, row) for run, rows in chosen for row in rows]
         episode = flown[0][1]
         scene = _scene(root, episode["scene"])
         instances = [t for t in scene.instances(episode["nav_id"]) if t["task_id"] == task_id]

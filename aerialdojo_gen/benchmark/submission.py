@@ -154,9 +154,8 @@ def logged(log: DataRoot, run: str) -> Logged:
     )
     if pc.any(pc.is_nan(table["euclidean_m"])).as_py():
         return Logged(table, flown, None)
-    overall = summarize(episodes_of(table), PROFILES["aerialdojo"]).overall._asdict()
-    known = {name: overall[name] for name in METRICS}
-    return Logged(table, flown, {name: None if math.isnan(v) else round(v, 9) for name, v in known.items()})
+    overall = zip(METRICS, summarize(episodes_of(table), PROFILES["aerialdojo"]).overall[1:], strict=True)
+    return Logged(table, flown, {name: None if math.isnan(v) else round(v, 9) for name, v in overall})
 
 
 def scene_facts(data: DataRoot, rows: pa.Table) -> dict[str, SceneFacts]:

@@ -106,7 +106,7 @@ STRUCK = {
     2: (Status(400, "blocked", {}, "content_filter"), "content filter"),
     4: (Status(400, CONTEXT), "context too long"),
     7: (Raw(b"<html>hello"), "malformed answer"),
-    8: (Raw(b'{"choices": 7}'), "malformed answer"),
+    9: (Raw(b'{"choices": 7}'), "malformed answer"),
     10: (Status(500, "broken\nby accident"), "server error"),
     12: (Status(429, "slow down", {"retry-after": "0"}), "rate limit"),
     13: (Cut(), "connection lost"),
@@ -134,7 +134,8 @@ def striking():
 
 
 def test_whatever_a_service_does_a_run_of_sixteen_ends_with_sixteen_rows(smoke, tmp_path):
-    more, n = ("--limit", "16", "--attempts", "1"), len(STRUCK)
+    # Two failures in a row, of two kinds, do not end it.
+    more, n = ("--limit", "16", "--attempts", "1", "--failures-in-row", "2"), len(STRUCK)
     with serving(Say(STOP)) as service:
         service.policy = striking()
         done = fly(smoke, tmp_path, service, *more)
