@@ -22,10 +22,9 @@ from aerialdojo_gen.exchange.frames import Frame
 from aerialdojo_gen.exchange.records import BadField
 from aerialdojo_gen.geometry.frames import quaternion_xyzw_to_yaw, wrap_turned_rad
 from aerialdojo_gen.geometry.motion import route_length_m
-from aerialdojo_gen.store.parquet_files import write_file
 from aerialdojo_gen.store.schemas import RELEASE_OBJECTS, ROUTES, TASKS, TableSpec
-from aerialdojo_gen.store.schemas.columns import column, list_of
-from aerialdojo_gen.store.tables import check_table, from_rows
+from aerialdojo_gen.store.schemas.staged import column, list_of
+from aerialdojo_gen.store.tables import check_table, from_rows, write_file
 
 Floats = NDArray[np.float64]
 
