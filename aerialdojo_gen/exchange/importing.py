@@ -14,7 +14,7 @@ import numpy as np
 
 from aerialdojo_gen.base.errors import ImportRefused, UsageError, brief
 from aerialdojo_gen.base.names import check_known
-from aerialdojo_gen.exchange import aerialdojo_reader, readers
+from aerialdojo_gen.exchange import aerialdojo_layout, readers
 from aerialdojo_gen.exchange.folder import whole_folder_below, write_json
 from aerialdojo_gen.exchange.frames import FRAMES, Frame
 from aerialdojo_gen.exchange.records import BadField, Fields, records, shown
@@ -246,7 +246,7 @@ def _sources(format_name: str, files: Sequence[Path]) -> list[tuple[str, Path]]:
     for path in files:
         if not path.exists():
             raise UsageError(f"there is no file {path}")
-        for file in aerialdojo_reader.task_files(path) if format_name == "aerialdojo" else [path]:
+        for file in aerialdojo_layout.task_files(path) if format_name == "aerialdojo" else [path]:
             if not file.is_file():
                 raise UsageError(f"{file} is no file")
             found.setdefault(file.absolute())
@@ -255,7 +255,7 @@ def _sources(format_name: str, files: Sequence[Path]) -> list[tuple[str, Path]]:
     common = Path(os.path.commonpath([p.parent for p in found]))
     named: dict[str, Path] = {}
     for path in found:
-        label = aerialdojo_reader.label(path) if format_name == "aerialdojo" else None
+        label = aerialdojo_layout.label(path) if format_name == "aerialdojo" else None
         label = label or path.relative_to(common).as_posix()
         if label in named:
             raise UsageError(f"{path} and {named[label]} are both {label}: import one of them, or each by its --name")
@@ -266,7 +266,7 @@ def _sources(format_name: str, files: Sequence[Path]) -> list[tuple[str, Path]]:
 def _tasks(
     sources: Sequence[tuple[str, Path]], chosen: Format, frame: Frame, options: Options, report: Report, bad: TextIO
 ) -> Iterator[tuple[Task, dict[str, Any]]]:
-    read = chosen.read or aerialdojo_reader.Reader().read
+    read = chosen.read or aerialdojo_layout.Reader().read
     for label, path in sources:
         report.files.append(label)
         pictures = (options.pictures or path.parent) if options.with_pictures else None

@@ -15,7 +15,7 @@ from aerialdojo_gen.benchmark.agents.goal import Sensors
 from aerialdojo_gen.benchmark.observations import renderer_name
 from aerialdojo_gen.benchmark.tasks import Selection, mesh_of, reference_image, select
 from aerialdojo_gen.learning.index import Index, read_index
-from aerialdojo_gen.learning.pictures import Frames, RecordedFrames, RenderedFrames, Source
+from aerialdojo_gen.learning.pictures import Frames, RecordedFrames, RenderedFrames, Source, resized
 from aerialdojo_gen.learning.trajectories import SOURCES, recorded_alone
 from aerialdojo_gen.rendering.sample import choose_trajectories
 from aerialdojo_gen.store.root import DataRoot
@@ -167,5 +167,4 @@ class SampleFrames:
             return np.zeros((s.height, s.width, 3), np.uint8)
         picture = reference_image(self._root, self.part.scene, named)
         shrinks = picture.shape[0] >= s.height and picture.shape[1] >= s.width
-        how = cv2.INTER_AREA if shrinks else cv2.INTER_LINEAR
-        return np.asarray(cv2.resize(picture, (s.width, s.height), interpolation=how), np.uint8)
+        return resized(picture, s, cv2.INTER_AREA if shrinks else cv2.INTER_LINEAR)

@@ -242,7 +242,7 @@ class RecordedFrames:
             root, scene = index.sources[k]
             recording = _recording(root, f"media/{scene}/{index.nav_id[k]}")
             for (v, view), name in itertools.product(enumerate(s.views), out):
-                out[name][row, v] = _smaller(getattr(recording, name)[view][step], s, interpolations[name])
+                out[name][row, v] = resized(getattr(recording, name)[view][step], s, interpolations[name])
         if s.depth:
             clip_depth(out["depth_m"], s)
         return out
@@ -280,7 +280,8 @@ def _recording(root: DataRoot, folder: str) -> Recording:
     return recording
 
 
-def _smaller(image: NDArray[Any], sensors: Sensors, how: int) -> NDArray[Any]:
+def resized(image: NDArray[Any], sensors: Sensors, how: int) -> NDArray[Any]:
+    """Make a picture as large as the sensors' are, by an interpolation of OpenCV's."""
     if image.shape[:2] == (sensors.height, sensors.width):
         return image
     return np.asarray(cv2.resize(image, (sensors.width, sensors.height), interpolation=how))
