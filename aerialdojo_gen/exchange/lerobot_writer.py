@@ -31,7 +31,8 @@ FILES_A_CHUNK = 1000
 DATA_PATH = "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
 VIDEO_PATH = "videos/{video_key}/chunk-{chunk_index:03d}/file-{file_index:03d}.mp4"
 EPISODES_PATH = "meta/episodes/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
-GOAL = "observation.images.goal"
+# Features that are videos: a view's pictures, its depth, and the goal's picture.
+VIEW, DEPTH, GOAL = "observation.images.{}", "observation.depth.{}", "observation.images.goal"
 STATE = ("x_ahead_m", "y_left_m", "z_up_m", "yaw_rad", "remaining_actions")
 ACTION = ("forward_m", "left_m", "up_m", "turn_rad", "stop")
 # Features that are no videos: their type, and the names of their numbers where they have several.
@@ -52,21 +53,11 @@ OF_ACTION[TURN_LEFT, 3], OF_ACTION[TURN_RIGHT, 3] = TURN_RAD, -TURN_RAD
 OF_ACTION[STOP, 4] = 1.0
 
 
-def view_key(view: str) -> str:
-    """Name the feature of a view's pictures."""
-    return f"observation.images.{view}"
-
-
-def depth_key(view: str) -> str:
-    """Name the feature of a view's depth."""
-    return f"observation.depth.{view}"
-
-
 def video_kinds(options: ExportOptions) -> dict[str, str]:
     """Return the features that are videos, and of which kind each is: ``rgb`` or ``depth``."""
     s = options.sensors
-    pictures = {view_key(view): "rgb" for view in s.views} if s.rgb else {}
-    depths = {depth_key(view): "depth" for view in s.views} if s.depth else {}
+    pictures = {VIEW.format(view): "rgb" for view in s.views} if s.rgb else {}
+    depths = {DEPTH.format(view): "depth" for view in s.views} if s.depth else {}
     return pictures | ({GOAL: "rgb"} if "image" in options.goal else {}) | depths
 
 
@@ -226,7 +217,7 @@ def write_part(root: DataRoot, part: Part, options: ExportOptions, folder: Path)
 
 def _no_counts(options: ExportOptions) -> Counts:
     shapes, kinds = {"rgb": (3, 256), "depth": (1, DEPTH_CODES)}, video_kinds(options)
-    keys = [key for view in options.sensors.views for key in (view_key(view), depth_key(view))]
+    keys = [key for view in options.sensors.views for key in (VIEW.format(view), DEPTH.format(view))]
     return {key: np.zeros(shapes[kinds[key]], np.int64) for key in (*keys, GOAL) if key in kinds}
 
 
@@ -264,9 +255,9 @@ def _write_videos(
     for _, frames in sample_frames.frames(k):
         for v, view in enumerate(s.views):
             if "rgb" in frames:
-                write(view_key(view), frames["rgb"][:, v])
+                write(VIEW.format(view), frames["rgb"][:, v])
             if "depth_m" in frames:
-                write(depth_key(view), depth_codes(frames["depth_m"][:, v], s.max_depth_m))
+                write(DEPTH.format(view), depth_codes(frames["depth_m"][:, v], s.max_depth_m))
     if GOAL in clips:
         write(GOAL, sample_frames.goal(k)[None], int(sample_frames.part.index.steps[k]))
     return counts

@@ -53,7 +53,6 @@ torch = pytest.importorskip("torch", reason="PyTorch is not installed: it is the
 
 from aerialdojo_gen.learning.network import pose_loss  # noqa: E402 - it needs torch
 
-POLICY = "policy"
 TEXT = """
 name = "small"
 [data]
@@ -101,7 +100,7 @@ def test_eight_trajectories_are_learned_by_heart_and_flown(smoke, cache, tmp_pat
     assert history(learned.policy.parent)[-1]["accuracy"] > 0.95
     assert learned.imitation.is_file()
     options = {"weights": str(learned.policy)}
-    evaluate(smoke, Evaluation("learned", POLICY, options, Selection(("id_train",))), out=tmp_path, workers=1)
+    evaluate(smoke, Evaluation("learned", "policy", options, Selection(("id_train",))), out=tmp_path, workers=1)
     rows = read_run(tmp_path, "learned").to_pylist()
     index = read_index(open_root(smoke), Selection(("id_train",)))
     eight = set(index.take(sample_evenly(index, 8, 0)).nav_id)
@@ -224,7 +223,7 @@ def test_weights_of_another_action_set_or_release_are_refused_with_both_fingerpr
     def fly(options=(), **said):
         path = rewritten(learned.policy, tmp_path / "changed.safetensors", **said)
         chosen = Selection(("id_train",), limit=1)
-        evaluation = Evaluation("refused", POLICY, {"weights": str(path), **dict(options)}, chosen)
+        evaluation = Evaluation("refused", "policy", {"weights": str(path), **dict(options)}, chosen)
         return evaluate(smoke, evaluation, out=tmp_path / "log", workers=1)
 
     with pytest.raises(UsageError, match=r"another action set: its fingerprint is f{16}, and .* [0-9a-f]{16}"):
