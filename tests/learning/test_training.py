@@ -220,8 +220,8 @@ def test_a_map_is_learned_from_looks_about_too(smoke, cache, tmp_path):
 
 
 def test_weights_of_another_action_set_or_release_are_refused_with_both_fingerprints(smoke, learned, tmp_path):
-    def fly(options=(), **said):
-        path = rewritten(learned.policy, tmp_path / "changed.safetensors", **said)
+    def fly(options=(), **changed):
+        path = rewritten(learned.policy, tmp_path / "changed.safetensors", **changed)
         chosen = Selection(("id_train",), limit=1)
         evaluation = Evaluation("refused", "policy", {"weights": str(path), **dict(options)}, chosen)
         return evaluate(smoke, evaluation, out=tmp_path / "log", workers=1)
@@ -233,7 +233,7 @@ def test_weights_of_another_action_set_or_release_are_refused_with_both_fingerpr
     assert fly({"any_release": True}, release="e" * 64).finished == 1
 
 
-def test_what_is_no_policy_is_said_in_a_line(tmp_path, learned):
+def test_what_is_no_policy_is_refused_in_a_line(tmp_path, learned):
     with pytest.raises(UsageError, match="there are no weights"):
         read_weights(tmp_path / "none.safetensors")
     cut = tmp_path / "cut.safetensors"
@@ -266,17 +266,17 @@ def test_the_teachers_labels_are_the_planners_own_plan():
     planner, teacher = Planner(world), Teacher(world)
     goal, *starts = free_poses(planner.grid, np.random.default_rng(1), 5)
     with teacher.cache_fields():
-        ways = teacher.plan([goal] * len(starts), starts)
-        for start, way in zip(starts, ways, strict=True):
+        plans = teacher.plan([goal] * len(starts), starts)
+        for start, plan in zip(starts, plans, strict=True):
             route = planner.plan_one(goal, start)
             assert route.outcome == "SOLVED"
-            assert way[0] == agent_actions(route.actions)[0]
+            assert plan[0] == agent_actions(route.actions)[0]
             episode = Episode(FlightSpace(world, 0.25), tuple(start), tuple(goal[:3]), 300)
             while episode.termination is None:
                 pose = np.array([*episode.position, episode.yaw_rad])
-                (way,) = teacher.plan([goal], [pose])
-                assert len(way)
-                episode.step(int(way[0]))
+                (plan,) = teacher.plan([goal], [pose])
+                assert len(plan)
+                episode.step(int(plan[0]))
             assert episode.termination == "stop"
             assert episode.distance_m <= 1.0 + 1e-6
             assert episode.path_length_m <= route.length_m * 1.02 + 0.1
@@ -372,14 +372,7 @@ def flown(root, net, sensors, index, k, led):
 def test_told_where_goals_are_it_flies_there_though_its_map_knows_nothing(smoke, tmp_path):
     root = open_root(smoke)
     # The map learns nothing: where the goal is, is told or not known at all.
-    thorough = {
-        "epochs": 16,
-        "batch_steps": 256,
-        "learning_rate": 3e-3,
-        "goal_weight": 0.0,
-        "looks": 256,
-        "checkpoint_s": 60,
-    }
+    thorough = {"epochs": 16, "batch_steps": 256, "learning_rate": 3e-3, "goal_weight": 0.0, "looks": 256}
     data = {"views": ["front", "down"], "limit": None, "validation_share": 0.02}
     own = recipe(data=data, model=LARGER | {"word_features": 16}, train=thorough)
     policy = train_here(smoke, own, tmp_path / "out", tmp_path / "cache").policy
