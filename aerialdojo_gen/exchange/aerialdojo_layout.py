@@ -87,11 +87,11 @@ def task_files(path: Path) -> list[Path]:
     if not path.is_dir():
         return [path]
     root = path.resolve()
-    found = [p for p in path.rglob(TASK_FILE) if p.resolve().is_relative_to(root)]
-    if not found:
+    files = [p for p in path.rglob(TASK_FILE) if p.resolve().is_relative_to(root)]
+    if not files:
         raise UsageError(f"{path} has no {TASK_FILE} below it: name the folder that holds {' and '.join(KINDS)}")
     # A partition's two files come one after the other, so that its trajectories are read once.
-    return sorted(found, key=lambda p: (p.parent.parts[-3:], p.parts))
+    return sorted(files, key=lambda p: (p.parent.parts[-3:], p.parts))
 
 
 def label(path: Path) -> str | None:
@@ -241,10 +241,10 @@ def _read_trajectory(root: Path, partition: Partition, task: Task, context: Cont
 def _attitude(pose: Fields) -> NDArray[np.float64]:
     """Return the start's quaternion, xyzw: the recorder's data and the evaluator have a name of their own for it."""
     names = [name for name in ("start_quaternion_xyzw", "start_quaternionr") if pose.has(name)]
-    found = [pose.quaternion(name) for name in names or ["start_quaternion_xyzw"]]
-    if np.abs(found[-1] - found[0]).max() > _EXACT:
+    quaternions = [pose.quaternion(name) for name in names or ["start_quaternion_xyzw"]]
+    if np.abs(quaternions[-1] - quaternions[0]).max() > _EXACT:
         raise BadField(pose.path(names[1]), f"is not {names[0]}")
-    return found[0]
+    return quaternions[0]
 
 
 def _agree(partition: Partition, scene: str, word: str, trains: bool) -> None:
@@ -266,9 +266,9 @@ def _route(document: Fields, context: Context) -> Route:
         if not isinstance(step, dict):
             raise BadField(where, f"expected an object, found {shown(step)}")
         word = step.get("action")
-        known = ["start"] if k == 0 else [*WORDS, "stop"] if k == len(steps) - 1 else list(WORDS)
-        if word not in known:
-            raise BadField(f"{where}.action", f"unknown action {shown(word)}: known here are {', '.join(known)}")
+        allowed = ["start"] if k == 0 else [*WORDS, "stop"] if k == len(steps) - 1 else list(WORDS)
+        if word not in allowed:
+            raise BadField(f"{where}.action", f"unknown action {shown(word)}: known here are {', '.join(allowed)}")
         words.append(str(word))
         for name in _STEP:
             if name not in step:

@@ -242,19 +242,19 @@ def _frame(format_name: str, chosen: Format, asked: str | None) -> Frame:
 
 def _sources(format_name: str, files: Sequence[Path]) -> list[tuple[str, Path]]:
     """The files, each once, by their names relative to the folder that they share."""
-    found: dict[Path, None] = {}
+    absolute: dict[Path, None] = {}
     for path in files:
         if not path.exists():
             raise UsageError(f"there is no file {path}")
         for file in aerialdojo_layout.task_files(path) if format_name == "aerialdojo" else [path]:
             if not file.is_file():
                 raise UsageError(f"{file} is no file")
-            found.setdefault(file.absolute())
-    if not found:
+            absolute.setdefault(file.absolute())
+    if not absolute:
         raise UsageError("no file is named")
-    common = Path(os.path.commonpath([p.parent for p in found]))
+    common = Path(os.path.commonpath([p.parent for p in absolute]))
     named: dict[str, Path] = {}
-    for path in found:
+    for path in absolute:
         label = aerialdojo_layout.label(path) if format_name == "aerialdojo" else None
         label = label or path.relative_to(common).as_posix()
         if label in named:

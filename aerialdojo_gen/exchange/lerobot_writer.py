@@ -159,9 +159,9 @@ Counts = dict[str, NDArray[np.int64]]
 def row_stats(values: NDArray[Any]) -> Stats:
     """Statistics of the rows of an (n, d) array: d numbers each, and the count."""
     table = np.asarray(values, np.float64).reshape(len(values), -1)
-    found: Stats = {name: getattr(table, name)(axis=0).tolist() for name in ("min", "max", "mean", "std")}
+    stats: Stats = {name: getattr(table, name)(axis=0).tolist() for name in ("min", "max", "mean", "std")}
     levels = np.quantile(table, list(QUANTILES.values()), axis=0)
-    return {**found, "count": [len(table)], **dict(zip(QUANTILES, levels.tolist(), strict=True))}
+    return {**stats, "count": [len(table)], **dict(zip(QUANTILES, levels.tolist(), strict=True))}
 
 
 def count_stats(counts: NDArray[np.int64], values: NDArray[np.float64], frames: int) -> Stats:
@@ -172,10 +172,10 @@ def count_stats(counts: NDArray[np.int64], values: NDArray[np.float64], frames: 
     deviation = np.sqrt(np.einsum("cv,cv->c", counts, (values[None] - mean[:, None]) ** 2) / total)
     reached = np.cumsum(counts, axis=1)
     least, most = (counts > 0).argmax(axis=1), -1 - (counts[:, ::-1] > 0).argmax(axis=1)
-    found = {"min": values[least], "max": values[most], "mean": mean, "std": deviation}
+    stats = {"min": values[least], "max": values[most], "mean": mean, "std": deviation}
     for name, level in QUANTILES.items():
-        found[name] = values[(reached >= np.ceil(level * total)[:, None]).argmax(axis=1)]
-    shaped: Stats = {name: of.reshape(-1, 1, 1).tolist() for name, of in found.items()}
+        stats[name] = values[(reached >= np.ceil(level * total)[:, None]).argmax(axis=1)]
+    shaped: Stats = {name: of.reshape(-1, 1, 1).tolist() for name, of in stats.items()}
     return {**shaped, "count": [frames]}
 
 
@@ -207,11 +207,11 @@ def write_part(root: DataRoot, part: Part, options: ExportOptions, folder: Path)
             counts = _write_videos(sample_frames, k, options, clips)
             episodes.append({name: row_stats(values) for name, values in frames[-1].items()})
             episodes[-1] |= _describe_counts(counts, options, int(part.index.steps[k]))
-            for key, found in counts.items():
-                sums[key] += found
+            for key, count in counts.items():
+                sums[key] += count
     columns = {name: list(np.concatenate([of[name] for of in frames])) for name in frame_schema().names}
     write_file(folder / "data.parquet", pa.table(columns, schema=frame_schema()))
-    facts = {"stats": episodes, "counts": {key: found.tolist() for key, found in sums.items()}}
+    facts = {"stats": episodes, "counts": {key: count.tolist() for key, count in sums.items()}}
     (folder / _FACTS).write_text(json.dumps(facts), encoding="utf-8")
 
 
@@ -224,11 +224,11 @@ def _no_counts(options: ExportOptions) -> Counts:
 def _columns(part: Part, k: int) -> dict[str, NDArray[Any]]:
     n = int(part.index.steps[k])
     steps = np.arange(n)
-    found = labels_at(part.index, k, steps)
+    labels = labels_at(part.index, k, steps)
     return {
-        "observation.state": np.column_stack([found["odometry"], found["remaining_actions"]]).astype(np.float32),
-        "action": OF_ACTION[found["action"]],
-        "discrete_action": found["action"],
+        "observation.state": np.column_stack([labels["odometry"], labels["remaining_actions"]]).astype(np.float32),
+        "action": OF_ACTION[labels["action"]],
+        "discrete_action": labels["action"],
         "next.done": steps == n - 1,
         "timestamp": (steps / FPS).astype(np.float32),
         "frame_index": steps,
@@ -272,7 +272,7 @@ def _counted(values: NDArray[Any], n: int) -> NDArray[np.int64]:
 def _describe_counts(counts: Counts, options: ExportOptions, frames: int) -> dict[str, Stats]:
     values = {"rgb": np.arange(256) / 255.0, "depth": depths_of_codes_m(options.sensors.max_depth_m)}
     kinds = video_kinds(options)
-    return {key: count_stats(found, values[kinds[key]], frames) for key, found in counts.items()}
+    return {key: count_stats(count, values[kinds[key]], frames) for key, count in counts.items()}
 
 
 def finish(parts: list[Part], options: ExportOptions, made: list[Path], folder: Path) -> dict[str, int]:
@@ -288,8 +288,8 @@ def finish(parts: list[Part], options: ExportOptions, made: list[Path], folder: 
         path = folder / EPISODES_PATH.format(**at)
         path.parent.mkdir(parents=True, exist_ok=True)
         write_file(path, _episodes(part, facts["stats"], keys, at))
-        for key, found in facts["counts"].items():
-            sums[key] += np.array(found, np.int64)
+        for key, count in facts["counts"].items():
+            sums[key] += np.array(count, np.int64)
         tables.append(read_file(source / "data.parquet"))
     frames = sum(part.frames for part in parts)
     episodes = sum(len(part.index) for part in parts)

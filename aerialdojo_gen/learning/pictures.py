@@ -254,14 +254,14 @@ def recorded_frames(root: DataRoot, scene: str, sensors: Sensors) -> dict[str, i
         return {}
     columns = ("nav_id", "view", "modality", "sampling", "n_frames", "width", "height", "fov_deg", "ok")
     kinds = [kind for kind, on in (("rgb", sensors.rgb), ("depth", sensors.depth)) if on]
-    found: dict[str, dict[tuple[str, str], int]] = defaultdict(dict)
+    counts: dict[str, dict[tuple[str, str], int]] = defaultdict(dict)
     for row in store.read_stored(root, "recordings", scene, columns).to_pylist():
         # Pixels of another shape would show another field of view.
         fits = row["width"] * sensors.height == row["height"] * sensors.width and row["fov_deg"] == sensors.fov_deg
         if row["ok"] and row["sampling"] == "steps" and fits:
-            found[row["nav_id"]][row["view"], row["modality"]] = row["n_frames"]
+            counts[row["nav_id"]][row["view"], row["modality"]] = row["n_frames"]
     wanted = {*itertools.product(sensors.views, kinds)}
-    return {nav_id: [*frames.values()][-1] for nav_id, frames in found.items() if wanted <= frames.keys()}
+    return {nav_id: [*frames.values()][-1] for nav_id, frames in counts.items() if wanted <= frames.keys()}
 
 
 # Few are kept open: a trajectory's steps follow each other within a block.
