@@ -128,7 +128,7 @@ def write_scene(data: DataRoot, scene: str, root: Path, picture_px: int = 0) -> 
         for setting in layout.SETTING_WORDS:
             chosen = routes.filter(pa.compute.equal(routes["setting"], setting)).sort_by("nav_id")
             own = tasks.filter(pa.compute.equal(tasks["setting"], setting)).sort_by("nav_id").to_pylist()
-            partition = layout.partition_of(scene, setting, store.partition(scene).upper(), subset)
+            partition = layout.Partition(scene, setting, store.partition(scene).upper(), subset)
             # Episodes are numbered by their places in the table.
             ends = {row["nav_id"]: (str(k), row) for k, row in enumerate(chosen.select(_ENDS).to_pylist())}
             for kind, modality in layout.KINDS.items():

@@ -14,7 +14,7 @@ import numpy as np
 
 from aerialdojo_gen.base.errors import ImportRefused, UsageError, brief
 from aerialdojo_gen.base.names import check_known
-from aerialdojo_gen.exchange import aerialdojo_reader, readers
+from aerialdojo_gen.exchange import aerialdojo_layout, readers
 from aerialdojo_gen.exchange.folder import whole_folder_below, write_json
 from aerialdojo_gen.exchange.frames import FRAMES, Frame
 from aerialdojo_gen.exchange.records import BadField, Fields, records, shown
@@ -242,20 +242,20 @@ def _frame(format_name: str, chosen: Format, asked: str | None) -> Frame:
 
 def _sources(format_name: str, files: Sequence[Path]) -> list[tuple[str, Path]]:
     """The files, each once, by their names relative to the folder that they share."""
-    found: dict[Path, None] = {}
+    absolute: dict[Path, None] = {}
     for path in files:
         if not path.exists():
             raise UsageError(f"there is no file {path}")
-        for file in aerialdojo_reader.task_files(path) if format_name == "aerialdojo" else [path]:
+        for file in aerialdojo_layout.task_files(path) if format_name == "aerialdojo" else [path]:
             if not file.is_file():
                 raise UsageError(f"{file} is no file")
-            found.setdefault(file.absolute())
-    if not found:
+            absolute.setdefault(file.absolute())
+    if not absolute:
         raise UsageError("no file is named")
-    common = Path(os.path.commonpath([p.parent for p in found]))
+    common = Path(os.path.commonpath([p.parent for p in absolute]))
     named: dict[str, Path] = {}
-    for path in found:
-        label = aerialdojo_reader.label(path) if format_name == "aerialdojo" else None
+    for path in absolute:
+        label = aerialdojo_layout.label(path) if format_name == "aerialdojo" else None
         label = label or path.relative_to(common).as_posix()
         if label in named:
             raise UsageError(f"{path} and {named[label]} are both {label}: import one of them, or each by its --name")
@@ -266,7 +266,7 @@ def _sources(format_name: str, files: Sequence[Path]) -> list[tuple[str, Path]]:
 def _tasks(
     sources: Sequence[tuple[str, Path]], chosen: Format, frame: Frame, options: Options, report: Report, bad: TextIO
 ) -> Iterator[tuple[Task, dict[str, Any]]]:
-    read = chosen.read or aerialdojo_reader.Reader().read
+    read = chosen.read or aerialdojo_layout.Reader().read
     for label, path in sources:
         report.files.append(label)
         pictures = (options.pictures or path.parent) if options.with_pictures else None

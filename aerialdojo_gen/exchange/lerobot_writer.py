@@ -31,7 +31,8 @@ FILES_A_CHUNK = 1000
 DATA_PATH = "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
 VIDEO_PATH = "videos/{video_key}/chunk-{chunk_index:03d}/file-{file_index:03d}.mp4"
 EPISODES_PATH = "meta/episodes/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
-GOAL = "observation.images.goal"
+# Features that are videos: a view's pictures, its depth, and the goal's picture.
+VIEW, DEPTH, GOAL = "observation.images.{}", "observation.depth.{}", "observation.images.goal"
 STATE = ("x_ahead_m", "y_left_m", "z_up_m", "yaw_rad", "remaining_actions")
 ACTION = ("forward_m", "left_m", "up_m", "turn_rad", "stop")
 # Features that are no videos: their type, and the names of their numbers where they have several.
@@ -52,21 +53,11 @@ OF_ACTION[TURN_LEFT, 3], OF_ACTION[TURN_RIGHT, 3] = TURN_RAD, -TURN_RAD
 OF_ACTION[STOP, 4] = 1.0
 
 
-def view_key(view: str) -> str:
-    """Name the feature of a view's pictures."""
-    return f"observation.images.{view}"
-
-
-def depth_key(view: str) -> str:
-    """Name the feature of a view's depth."""
-    return f"observation.depth.{view}"
-
-
 def video_kinds(options: ExportOptions) -> dict[str, str]:
     """Return the features that are videos, and of which kind each is: ``rgb`` or ``depth``."""
     s = options.sensors
-    pictures = {view_key(view): "rgb" for view in s.views} if s.rgb else {}
-    depths = {depth_key(view): "depth" for view in s.views} if s.depth else {}
+    pictures = {VIEW.format(view): "rgb" for view in s.views} if s.rgb else {}
+    depths = {DEPTH.format(view): "depth" for view in s.views} if s.depth else {}
     return pictures | ({GOAL: "rgb"} if "image" in options.goal else {}) | depths
 
 
@@ -168,9 +159,9 @@ Counts = dict[str, NDArray[np.int64]]
 def row_stats(values: NDArray[Any]) -> Stats:
     """Statistics of the rows of an (n, d) array: d numbers each, and the count."""
     table = np.asarray(values, np.float64).reshape(len(values), -1)
-    found: Stats = {name: getattr(table, name)(axis=0).tolist() for name in ("min", "max", "mean", "std")}
+    stats: Stats = {name: getattr(table, name)(axis=0).tolist() for name in ("min", "max", "mean", "std")}
     levels = np.quantile(table, list(QUANTILES.values()), axis=0)
-    return {**found, "count": [len(table)], **dict(zip(QUANTILES, levels.tolist(), strict=True))}
+    return {**stats, "count": [len(table)], **dict(zip(QUANTILES, levels.tolist(), strict=True))}
 
 
 def count_stats(counts: NDArray[np.int64], values: NDArray[np.float64], frames: int) -> Stats:
@@ -181,10 +172,10 @@ def count_stats(counts: NDArray[np.int64], values: NDArray[np.float64], frames: 
     deviation = np.sqrt(np.einsum("cv,cv->c", counts, (values[None] - mean[:, None]) ** 2) / total)
     reached = np.cumsum(counts, axis=1)
     least, most = (counts > 0).argmax(axis=1), -1 - (counts[:, ::-1] > 0).argmax(axis=1)
-    found = {"min": values[least], "max": values[most], "mean": mean, "std": deviation}
+    stats = {"min": values[least], "max": values[most], "mean": mean, "std": deviation}
     for name, level in QUANTILES.items():
-        found[name] = values[(reached >= np.ceil(level * total)[:, None]).argmax(axis=1)]
-    shaped: Stats = {name: of.reshape(-1, 1, 1).tolist() for name, of in found.items()}
+        stats[name] = values[(reached >= np.ceil(level * total)[:, None]).argmax(axis=1)]
+    shaped: Stats = {name: of.reshape(-1, 1, 1).tolist() for name, of in stats.items()}
     return {**shaped, "count": [frames]}
 
 
@@ -216,28 +207,28 @@ def write_part(root: DataRoot, part: Part, options: ExportOptions, folder: Path)
             counts = _write_videos(sample_frames, k, options, clips)
             episodes.append({name: row_stats(values) for name, values in frames[-1].items()})
             episodes[-1] |= _describe_counts(counts, options, int(part.index.steps[k]))
-            for key, found in counts.items():
-                sums[key] += found
+            for key, count in counts.items():
+                sums[key] += count
     columns = {name: list(np.concatenate([of[name] for of in frames])) for name in frame_schema().names}
     write_file(folder / "data.parquet", pa.table(columns, schema=frame_schema()))
-    facts = {"stats": episodes, "counts": {key: found.tolist() for key, found in sums.items()}}
+    facts = {"stats": episodes, "counts": {key: count.tolist() for key, count in sums.items()}}
     (folder / _FACTS).write_text(json.dumps(facts), encoding="utf-8")
 
 
 def _no_counts(options: ExportOptions) -> Counts:
     shapes, kinds = {"rgb": (3, 256), "depth": (1, DEPTH_CODES)}, video_kinds(options)
-    keys = [key for view in options.sensors.views for key in (view_key(view), depth_key(view))]
+    keys = [key for view in options.sensors.views for key in (VIEW.format(view), DEPTH.format(view))]
     return {key: np.zeros(shapes[kinds[key]], np.int64) for key in (*keys, GOAL) if key in kinds}
 
 
 def _columns(part: Part, k: int) -> dict[str, NDArray[Any]]:
     n = int(part.index.steps[k])
     steps = np.arange(n)
-    found = labels_at(part.index, k, steps)
+    labels = labels_at(part.index, k, steps)
     return {
-        "observation.state": np.column_stack([found["odometry"], found["remaining_actions"]]).astype(np.float32),
-        "action": OF_ACTION[found["action"]],
-        "discrete_action": found["action"],
+        "observation.state": np.column_stack([labels["odometry"], labels["remaining_actions"]]).astype(np.float32),
+        "action": OF_ACTION[labels["action"]],
+        "discrete_action": labels["action"],
         "next.done": steps == n - 1,
         "timestamp": (steps / FPS).astype(np.float32),
         "frame_index": steps,
@@ -264,9 +255,9 @@ def _write_videos(
     for _, frames in sample_frames.frames(k):
         for v, view in enumerate(s.views):
             if "rgb" in frames:
-                write(view_key(view), frames["rgb"][:, v])
+                write(VIEW.format(view), frames["rgb"][:, v])
             if "depth_m" in frames:
-                write(depth_key(view), depth_codes(frames["depth_m"][:, v], s.max_depth_m))
+                write(DEPTH.format(view), depth_codes(frames["depth_m"][:, v], s.max_depth_m))
     if GOAL in clips:
         write(GOAL, sample_frames.goal(k)[None], int(sample_frames.part.index.steps[k]))
     return counts
@@ -281,7 +272,7 @@ def _counted(values: NDArray[Any], n: int) -> NDArray[np.int64]:
 def _describe_counts(counts: Counts, options: ExportOptions, frames: int) -> dict[str, Stats]:
     values = {"rgb": np.arange(256) / 255.0, "depth": depths_of_codes_m(options.sensors.max_depth_m)}
     kinds = video_kinds(options)
-    return {key: count_stats(found, values[kinds[key]], frames) for key, found in counts.items()}
+    return {key: count_stats(count, values[kinds[key]], frames) for key, count in counts.items()}
 
 
 def finish(parts: list[Part], options: ExportOptions, made: list[Path], folder: Path) -> dict[str, int]:
@@ -297,8 +288,8 @@ def finish(parts: list[Part], options: ExportOptions, made: list[Path], folder: 
         path = folder / EPISODES_PATH.format(**at)
         path.parent.mkdir(parents=True, exist_ok=True)
         write_file(path, _episodes(part, facts["stats"], keys, at))
-        for key, found in facts["counts"].items():
-            sums[key] += np.array(found, np.int64)
+        for key, count in facts["counts"].items():
+            sums[key] += np.array(count, np.int64)
         tables.append(read_file(source / "data.parquet"))
     frames = sum(part.frames for part in parts)
     episodes = sum(len(part.index) for part in parts)

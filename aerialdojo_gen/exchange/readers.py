@@ -31,10 +31,10 @@ def moves_of(record: Fields, key: str, moves: dict[int, Move]) -> list[Move]:
     for k, number in enumerate(numbers):
         if number not in moves:
             raise BadField(f"{key}[{k}]", f"unknown action {number}: known are {', '.join(map(str, moves))}")
-    found = [moves[number] for number in numbers]
-    if "stop" in (names := [m.name for m in found])[:-1]:
+    flown = [moves[number] for number in numbers]
+    if "stop" in (names := [m.name for m in flown])[:-1]:
         raise BadField(f"{key}[{names.index('stop')}]", "stop before the end")
-    return found
+    return flown
 
 
 def without_stop(moves: list[Move]) -> list[Move]:

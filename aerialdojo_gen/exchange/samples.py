@@ -15,7 +15,7 @@ from aerialdojo_gen.benchmark.agents.goal import Sensors
 from aerialdojo_gen.benchmark.observations import renderer_name
 from aerialdojo_gen.benchmark.tasks import Selection, mesh_of, reference_image, select
 from aerialdojo_gen.learning.index import Index, read_index
-from aerialdojo_gen.learning.pictures import Frames, RecordedFrames, RenderedFrames, Source
+from aerialdojo_gen.learning.pictures import Frames, RecordedFrames, RenderedFrames, Source, resized
 from aerialdojo_gen.learning.trajectories import SOURCES, recorded_alone
 from aerialdojo_gen.rendering.sample import choose_trajectories
 from aerialdojo_gen.store.root import DataRoot
@@ -102,8 +102,8 @@ def plan_parts(root: DataRoot, options: ExportOptions, frames_a_part: int) -> li
     selection = Selection(options.splits, options.settings, modalities, options.scenes)
     index = read_index(root, selection, runs=options.runs)
     facts = select(root, selection).select(["nav_id", "scene", "setting", "partition", "subset"]).to_pylist()
-    known = {row["nav_id"]: row for row in facts}
-    chosen = index.take(_chosen(index, known, options))
+    facts_of = {row["nav_id"]: row for row in facts}
+    chosen = index.take(_chosen(index, facts_of, options))
     if options.source != "recordings":
         for scene in chosen.scenes:
             mesh_of(root, scene)  # a scene without a mesh is named before the first picture
@@ -113,7 +113,7 @@ def plan_parts(root: DataRoot, options: ExportOptions, frames_a_part: int) -> li
     number = {text: k for k, text in enumerate(dict.fromkeys(texts))}
     parts: list[Part] = []
     for rows in _cuts(chosen, frames_a_part):
-        own, goals = [known[chosen.nav_id[k]] for k in rows], [texts[k] for k in rows]
+        own, goals = [facts_of[chosen.nav_id[k]] for k in rows], [texts[k] for k in rows]
         parts.append(Part(
             len(parts), chosen.take(rows), [row["setting"] for row in own],
             [f"{row['partition'].lower()}_{row['subset']}" for row in own],
@@ -122,12 +122,12 @@ def plan_parts(root: DataRoot, options: ExportOptions, frames_a_part: int) -> li
     return parts
 
 
-def _chosen(index: Index, known: dict[str, dict[str, str]], options: ExportOptions) -> NDArray[np.int64]:
+def _chosen(index: Index, facts_of: dict[str, dict[str, str]], options: ExportOptions) -> NDArray[np.int64]:
     if not options.limit:
         return np.arange(len(index))
     taken: set[str] = set()
     for scene in index.scenes:
-        rows = [known[nav_id] for nav_id in index.nav_id if known[nav_id]["scene"] == scene]
+        rows = [facts_of[nav_id] for nav_id in index.nav_id if facts_of[nav_id]["scene"] == scene]
         taken.update(choose_trajectories(rows, options.limit, options.seed))
     return np.flatnonzero([nav_id in taken for nav_id in index.nav_id])
 
@@ -167,5 +167,4 @@ class SampleFrames:
             return np.zeros((s.height, s.width, 3), np.uint8)
         picture = reference_image(self._root, self.part.scene, named)
         shrinks = picture.shape[0] >= s.height and picture.shape[1] >= s.width
-        how = cv2.INTER_AREA if shrinks else cv2.INTER_LINEAR
-        return np.asarray(cv2.resize(picture, (s.width, s.height), interpolation=how), np.uint8)
+        return resized(picture, s, cv2.INTER_AREA if shrinks else cv2.INTER_LINEAR)

@@ -69,7 +69,7 @@ def _to_json(part: Part, k: int, options: ExportOptions) -> list[dict[str, Any]]
     """Return the JSON of every step of a trajectory."""
     index = part.index
     n = int(index.steps[k])
-    found = labels_at(index, k, np.arange(n))
+    labels = labels_at(index, k, np.arange(n))
     whole: dict[str, Any] = {
         "nav_id": index.nav_id[k], "scene": part.scene, "split": part.splits[k], "setting": part.settings[k],
         "n_steps": n, "task": part.texts[k],
@@ -77,8 +77,8 @@ def _to_json(part: Part, k: int, options: ExportOptions) -> list[dict[str, Any]]
     hints = ["target_name", "landmark", "direction", "description"] if "text" in options.goal else []
     hints += ["reference_image_id", "image_distance_m"] if "image" in options.goal else []
     whole |= {name: index.goal_columns[name][k] for name in hints}
-    rows = zip(*(values.tolist() for values in found.values()), strict=True)
-    return [{**whole, "step": step, **dict(zip(found, row, strict=True))} for step, row in enumerate(rows)]
+    rows = zip(*(values.tolist() for values in labels.values()), strict=True)
+    return [{**whole, "step": step, **dict(zip(labels, row, strict=True))} for step, row in enumerate(rows)]
 
 
 def _picture(rgb: NDArray[np.uint8], options: ExportOptions) -> bytes:

@@ -91,12 +91,12 @@ class Index:
     @cached_property
     def digest(self) -> str:
         """SHA-256, hexadecimal, of all that a sample's labels come from."""
-        found = hashlib.sha256("\n".join(self.nav_id).encode())
+        sha256 = hashlib.sha256("\n".join(self.nav_id).encode())
         for array in (self.actions, self.first, self.start, self.goal, self.budget):
-            found.update(np.ascontiguousarray(array).tobytes())
+            sha256.update(np.ascontiguousarray(array).tobytes())
         for name, texts in sorted(self.goal_columns.items()):
-            found.update(f"{name}\0{texts}".encode())
-        return found.hexdigest()
+            sha256.update(f"{name}\0{texts}".encode())
+        return sha256.hexdigest()
 
     def take(self, rows: NDArray[np.int64]) -> Index:
         """Keep some trajectories, in their order."""
@@ -123,7 +123,7 @@ def read_index(
     check_paraphrase(paraphrase)
     parts: list[Index] = []
     refused: list[UsageError] = []
-    known: dict[str, DataRoot] = {}
+    root_of: dict[str, DataRoot] = {}
     for root in [roots] if isinstance(roots, DataRoot) else roots:
         try:
             parts.append(_of_root(root, selection, target_split, runs, paraphrase))
@@ -131,9 +131,9 @@ def read_index(
             refused.append(error)
             continue
         for scene in parts[-1].scenes:
-            if scene in known:
-                raise UsageError(f"scene {scene} is in {known[scene]} and in {root}: name one of them")
-            known[scene] = root
+            if scene in root_of:
+                raise UsageError(f"scene {scene} is in {root_of[scene]} and in {root}: name one of them")
+            root_of[scene] = root
     if not parts:
         raise refused[0] if refused else UsageError("name at least one data directory")
     whole = _joined(parts)
@@ -163,15 +163,15 @@ def _of_root(
 def _paraphrased(root: DataRoot, rows: pa.Table, seed: int) -> pa.Table:
     texts: list[str | None] = []
     for row in rows.select(["scene", "subset", "nav_id", "description"]).to_pylist():
-        known = texts_of_tasks(root, row["scene"], row["subset"])[row["nav_id"]]
-        one = known[rank(seed, "paraphrase", row["nav_id"]) % len(known)]
+        paraphrases = texts_of_tasks(root, row["scene"], row["subset"])[row["nav_id"]]
+        one = paraphrases[rank(seed, "paraphrase", row["nav_id"]) % len(paraphrases)]
         texts.append(None if row["description"] is None else one)
     return rows.set_column(rows.column_names.index("description"), "description", pa.array(texts, pa.string()))
 
 
 def _flown(root: DataRoot, runs: Sequence[str]) -> dict[str, NDArray[np.int8]]:
     """Read the actions of the runs' successful flights, of each navigation task the shortest."""
-    found: dict[str, NDArray[np.int8]] = {}
+    shortest: dict[str, NDArray[np.int8]] = {}
     for run in runs:
         rows = read_run(root, run, columns=["task_id", "nav_id", "success"])
         own = {row["task_id"]: row["nav_id"] for row in rows.to_pylist() if row["success"]}
@@ -183,9 +183,9 @@ def _flown(root: DataRoot, runs: Sequence[str]) -> dict[str, NDArray[np.int8]]:
         flights = steps.group_by("task_id", use_threads=False).aggregate([("action", "list")])
         for task_id, actions in zip(*(flights[name].to_pylist() for name in ("task_id", "action_list")), strict=True):
             nav_id = own[task_id]
-            if nav_id not in found or len(actions) < len(found[nav_id]):
-                found[nav_id] = np.array(actions, np.int8)
-    return found
+            if nav_id not in shortest or len(actions) < len(shortest[nav_id]):
+                shortest[nav_id] = np.array(actions, np.int8)
+    return shortest
 
 
 def _scene(
@@ -196,9 +196,9 @@ def _scene(
         rows = rows.filter(pc.is_in(rows["nav_id"], allowed))
     tasks: dict[str, dict[str, Any]] = {}
     for row in rows.to_pylist():
-        known = tasks.setdefault(row["nav_id"], row)
+        task = tasks.setdefault(row["nav_id"], row)
         for name in _BY_MODALITY:
-            known[name] = row[name] if known[name] is None else known[name]
+            task[name] = row[name] if task[name] is None else task[name]
     routes: dict[str, tuple[NDArray[np.int8], list[float]]] = {}
     for side in sorted({str(row["subset"]) for row in tasks.values()}):
         routes |= _routes(root, scene, side, tasks)
@@ -224,7 +224,7 @@ def _routes(
     table = store.read_stored(root, f"routes/{side}", scene, columns)
     table = table.filter(pc.is_in(table["nav_id"], pa.array(list(tasks), pa.string())))
     own = table["agent_action"].to_pylist() if "agent_action" in table.column_names else [None] * table.num_rows
-    found = {}
+    routes = {}
     for k, nav_id in enumerate(table["nav_id"].to_pylist()):
         # A release of an older version has the reference's actions alone: an agent has no Approach.
         row = own[k] if own[k] is not None else [a for a in table["action"][k].as_py() if a != APPROACH]
@@ -233,20 +233,20 @@ def _routes(
             raise StoreError(
                 f"the actions of route {nav_id} do not end in their one Stop: run {command('validate', scene=scene)}"
             )
-        found[nav_id] = (actions, [table[name][k].as_py() for name in _GOAL])
-    return found
+        routes[nav_id] = (actions, [table[name][k].as_py() for name in _GOAL])
+    return routes
 
 
 def _of_target_split(root: DataRoot, scene: str, side: str) -> list[str]:
-    found: list[str] = []
+    nav_ids: list[str] = []
     for subset in _SIDES:
         table = store.read_stored(root, f"tasks/{subset}", scene, ("nav_id", "target_split"))
         if "target_split" not in table.column_names or table["target_split"].null_count:
             raise UsageError(
                 f"the release in {root} has no split by objects for {scene}: it was made by an older version"
             )
-        found += table.filter(pc.equal(table["target_split"], side))["nav_id"].to_pylist()
-    return found
+        nav_ids += table.filter(pc.equal(table["target_split"], side))["nav_id"].to_pylist()
+    return nav_ids
 
 
 def _joined(parts: Sequence[Index]) -> Index:

@@ -62,8 +62,8 @@ class Geodesic:
     def distances_m(self, goal: ArrayLike, points: ArrayLike) -> Floats:
         """Shortest way lengths (n,), metres in the action metric, from points (n, 3) to a goal; inf for none."""
         g, p = np.asarray(goal, np.float64), np.asarray(points, np.float64).reshape(-1, 3)
-        found = np.asarray(costs_at(np.ascontiguousarray(p), self._grid.arrays, self._field(*g.tolist())))
-        return np.maximum(found, np.linalg.norm(p - g, axis=1))
+        costs = np.asarray(costs_at(np.ascontiguousarray(p), self._grid.arrays, self._field(*g.tolist())))
+        return np.maximum(costs, np.linalg.norm(p - g, axis=1))
 
     def actions(self, goal: ArrayLike, poses: ArrayLike) -> tuple[NDArray[np.bool_], NDArray[np.bool_], Floats]:
         """For poses (n, 4), (n, 16) each: whether actions collide or are refused, and the cost-to-go in metres."""

@@ -133,11 +133,11 @@ def goals_of(part: Part, index: Index) -> dict[str, Any]:
         for name, landmark, direction, description in zip(*names, strict=True)
     ]
     ids = index.goal_columns["reference_image_id"]
-    known = sorted({*ids} - {None})
-    shown = [goal_picture(reference_image(part.data, part.scene, one), part.sensors.width) for one in known]
+    image_ids = sorted({*ids} - {None})
+    shown = [goal_picture(reference_image(part.data, part.scene, one), part.sensors.width) for one in image_ids]
     return {
         "text": np.array(text, np.str_).reshape(len(index), 2),
-        "image": np.array([-1 if one is None else known.index(one) for one in ids], np.int64),
+        "image": np.array([-1 if one is None else image_ids.index(one) for one in ids], np.int64),
         "semantic": np.array([said is not None for said in names[3]], np.bool_),
         "images": np.array(shown, np.uint8).reshape(-1, *part.image_shape),
         "nav_id": np.array(index.nav_id, np.str_),
@@ -207,10 +207,10 @@ def _named(part: Part, index: Index) -> tuple[list[str], NDArray[np.int16]]:
     instances = open_scene(*mesh_of(part.data, part.scene), SEVERAL).scene.instances
     place = {instance.node: k for k, instance in enumerate(instances)}
     number = np.full(len(instances) + 1, NOTHING, np.int16)
-    known = sorted(names)
+    targets = sorted(names)
     for object_id, node in nodes_of(part.data, part.scene).items():
-        number[place[node]] = known.index(object_id) if object_id in names else UNNAMED
-    return [names[object_id] for object_id in known], number
+        number[place[node]] = targets.index(object_id) if object_id in names else UNNAMED
+    return [names[object_id] for object_id in targets], number
 
 
 def patch_labels(number: NDArray[np.int16]) -> NDArray[np.int16]:
@@ -221,6 +221,6 @@ def patch_labels(number: NDArray[np.int16]) -> NDArray[np.int16]:
     own = pixels[some]
     alike = (own[:, :, None] == own[:, None, :]).sum(axis=2) * (own != NOTHING)
     most = alike.argmax(axis=1)
-    found = own[np.arange(len(own)), most]
-    out[some] = np.where(alike.max(axis=1, initial=0) >= _MIN_PX, found, UNNAMED)
+    label = own[np.arange(len(own)), most]
+    out[some] = np.where(alike.max(axis=1, initial=0) >= _MIN_PX, label, UNNAMED)
     return out

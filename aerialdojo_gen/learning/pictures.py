@@ -241,7 +241,7 @@ class RecordedFrames:
             root, scene = index.sources[k]
             recording = _recording(root, f"media/{scene}/{index.nav_id[k]}")
             for (v, view), name in itertools.product(enumerate(s.views), out):
-                out[name][row, v] = _smaller(getattr(recording, name)[view][step], s, interpolations[name])
+                out[name][row, v] = resized(getattr(recording, name)[view][step], s, interpolations[name])
         if s.depth:
             clip_depth(out["depth_m"], s)
         return out
@@ -253,14 +253,14 @@ def recorded_frames(root: DataRoot, scene: str, sensors: Sensors) -> dict[str, i
         return {}
     columns = ("nav_id", "view", "modality", "sampling", "n_frames", "width", "height", "fov_deg", "ok")
     kinds = [kind for kind, on in (("rgb", sensors.rgb), ("depth", sensors.depth)) if on]
-    found: dict[str, dict[tuple[str, str], int]] = defaultdict(dict)
+    counts: dict[str, dict[tuple[str, str], int]] = defaultdict(dict)
     for row in store.read_stored(root, "recordings", scene, columns).to_pylist():
         # Pixels of another shape would show another field of view.
         fits = row["width"] * sensors.height == row["height"] * sensors.width and row["fov_deg"] == sensors.fov_deg
         if row["ok"] and row["sampling"] == "steps" and fits:
-            found[row["nav_id"]][row["view"], row["modality"]] = row["n_frames"]
+            counts[row["nav_id"]][row["view"], row["modality"]] = row["n_frames"]
     wanted = {*itertools.product(sensors.views, kinds)}
-    return {nav_id: [*frames.values()][-1] for nav_id, frames in found.items() if wanted <= frames.keys()}
+    return {nav_id: [*frames.values()][-1] for nav_id, frames in counts.items() if wanted <= frames.keys()}
 
 
 # Few are kept open: a trajectory's steps follow each other within a block.
@@ -279,7 +279,8 @@ def _recording(root: DataRoot, folder: str) -> Recording:
     return recording
 
 
-def _smaller(image: NDArray[Any], sensors: Sensors, how: int) -> NDArray[Any]:
+def resized(image: NDArray[Any], sensors: Sensors, how: int) -> NDArray[Any]:
+    """Make a picture as large as the sensors' are, by an interpolation of OpenCV's."""
     if image.shape[:2] == (sensors.height, sensors.width):
         return image
     return np.asarray(cv2.resize(image, (sensors.width, sensors.height), interpolation=how))

@@ -125,8 +125,8 @@ def patch_rays(sensors: Sensors) -> Floats:
     """Directions of patches' middles from the body: (views * rows * columns, 3), ahead, left and up, of depth 1 m."""
     rows, columns = sensors.height // PATCH_PX, sensors.width // PATCH_PX
     middle = sensors.camera.rays().reshape(rows, PATCH_PX, columns, PATCH_PX, 3).mean(axis=(1, 3)).reshape(-1, 3)
-    found = [middle @ view_pose(np.zeros(3), 0.0, view)[:3, :3].T for view in sensors.views]
-    return np.concatenate([np.empty((0, 3)), *found])
+    rays = [middle @ view_pose(np.zeros(3), 0.0, view)[:3, :3].T for view in sensors.views]
+    return np.concatenate([np.empty((0, 3)), *rays])
 
 
 def patch_depths_m(pictures: NDArray[np.uint8], range_m: float) -> Floats:

@@ -306,9 +306,9 @@ class _Training:
         # An epoch in the history but not in the checkpoint is repeated.
         p, file = self._learner.progress, self._folder / _HISTORY
         if file.is_file():
-            known = [row for row in _rows(file) if (row["phase"], row["epoch"]) < (p.phase, p.epoch)]
+            rows = [row for row in _rows(file) if (row["phase"], row["epoch"]) < (p.phase, p.epoch)]
             with atomic_file(self._folder, _HISTORY) as temporary:
-                temporary.write_text("".join(json.dumps(row) + "\n" for row in known), encoding="utf-8")
+                temporary.write_text("".join(json.dumps(row) + "\n" for row in rows), encoding="utf-8")
 
     def _check_settings(self) -> None:
         """Write the training's settings; UsageError if the folder was begun with others."""
@@ -321,10 +321,10 @@ class _Training:
         if path.is_file():
             before = read_json(path, UsageError)
             for name, value in own.items():
-                known = str(before.get(name, "none")) if isinstance(before, dict) else "none"
-                if known != value:
+                old = str(before.get(name, "none")) if isinstance(before, dict) else "none"
+                if old != value:
                     raise UsageError(
-                        f"{self._folder} was begun with another {name}: its fingerprint is {known[:16]}, and that of "
+                        f"{self._folder} was begun with another {name}: its fingerprint is {old[:16]}, and that of "
                         f"this one is {value[:16]}; give --restart, or another --out"
                     )
         with atomic_file(self._folder, _SETTINGS) as temporary:
@@ -343,7 +343,7 @@ def _rows(file: Path) -> Iterator[dict[str, Any]]:
 def _describe(kept: dict[str, Any]) -> str:
     """Describe an `Assessment`: the accuracy on what was not trained on."""
     shares = [(kept["blocked_told"], "blocked"), (kept["free_told"], "free")]
-    known = [f"{share:.1%} of {what}" for share, what in shares if share is not None]
-    suffix = f"; {' and '.join(known)} actions told" if known else ""
+    parts = [f"{share:.1%} of {what}" for share, what in shares if share is not None]
+    suffix = f"; {' and '.join(parts)} actions told" if parts else ""
     off = f"{kept['goal_off_at_start_m']:.1f} m at the start, {kept['goal_off_m']:.1f} m in all"
     return f"{kept['accuracy']:.1%}; goal off by {off}{suffix}"

@@ -240,7 +240,6 @@ def test_what_does_not_fit_is_refused_in_a_line_that_names_it(smoke, cache, lear
         (learned, {"data": {"views": ["front"]}}, UsageError,
          r"its \[data\] views is \['front', 'left'\], and the recipe's is \['front'\]"),
         (learned, {"data": {"size_px": 64}}, UsageError, r"its \[data\] size_px is 32, and the recipe's is 64"),
-        (tmp_path / "none.safetensors", {}, UsageError, r"there are no weights .*none\.safetensors"),
         (old, {}, UsageError, r"old\.safetensors does not say which scenes it was trained on"),
         (cut, {}, StoreError, r"cut\.safetensors holds no policy of this version"),
         (wordless, {}, StoreError, r"\d+ words to search for, for weights of \d+"),

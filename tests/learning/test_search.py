@@ -60,20 +60,20 @@ def test_a_patch_shows_what_most_of_its_pixels_do(seed, blocky):
     # Blocks of any size: patches of one object, of several, and of few pixels of one.
     small = rng.integers(-2, 4, (2, 16 // blocky + 1, 16 // blocky + 1)).astype(np.int16)
     number = small.repeat(blocky, axis=1).repeat(blocky, axis=2)[:, :16, :16]
-    for k, found in enumerate(parts.patch_labels(number).tolist()):
+    for k, label in enumerate(parts.patch_labels(number).tolist()):
         view, row, column = np.unravel_index(k, (2, 4, 4))
         own = number[view, 4 * row : 4 * row + 4, 4 * column : 4 * column + 4].ravel().tolist()
         count = {one: own.count(one) for one in set(own) - {NOTHING}}
         if not count:
-            assert found == NOTHING
+            assert label == NOTHING
         elif max(count.values()) < 4:
-            assert found == UNNAMED
+            assert label == UNNAMED
         else:
-            assert count[found] == max(count.values())
+            assert count[label] == max(count.values())
 
 
 def test_looks_about_tell_targets_of_their_side_and_no_others(looks):
-    part, found = looks
+    part, views = looks
     root, name = part.data, part.scene
     scene = open_scene(*mesh_of(root, name), SEVERAL).scene
     rows = store.read_scene(root, "release/objects", name, ("object_id", "name")).to_pylist()
@@ -81,60 +81,60 @@ def test_looks_about_tell_targets_of_their_side_and_no_others(looks):
     targets = {"train": set(), "test": set()}
     for side in ("train", "test"):
         tasks = store.read_scene(root, f"tasks/{side}", name, ("nav_id", "target_split")).to_pylist()
-        told = {row["nav_id"]: row["target_split"] for row in tasks}
+        side_of = {row["nav_id"]: row["target_split"] for row in tasks}
         for row in store.read_scene(root, f"routes/{side}", name, ("nav_id", "target_object_id")).to_pylist():
-            targets[told[row["nav_id"]]].add(nodes_of(root, name)[row["target_object_id"]])
+            targets[side_of[row["nav_id"]]].add(nodes_of(root, name)[row["target_object_id"]])
     assert targets["test"]
-    assert sorted(found.names) == sorted(called[node] for node in targets["train"])
+    assert sorted(views.names) == sorted(called[node] for node in targets["train"])
     renderer, seen = renderer_for(scene, "gl"), 0
-    for pose, shown in zip(found.pose[:20].astype(np.float64), found.shown, strict=False):
+    for pose, shown in zip(views.pose[:20].astype(np.float64), views.shown, strict=False):
         matrices = [view_pose(pose[:3], float(pose[3]), view) for view in SENSORS.views]
         instance = np.stack([p.instance for p in renderer.render_views(SENSORS.camera, matrices, True)])
         cut = instance.reshape(4, 8, 4, 8, 4).transpose(0, 1, 3, 2, 4).reshape(-1, 16)
-        for own, said in zip(cut, shown.tolist(), strict=True):
+        for own, label in zip(cut, shown.tolist(), strict=True):
             nodes = [scene.instances[k].node for k in own[own >= 0]]
-            if said >= 0:
+            if label >= 0:
                 # Poses are kept in single precision: a pixel at an edge may be another's.
-                assert sum(called.get(n) == found.names[said] and n in targets["train"] for n in nodes) >= 3
+                assert sum(called.get(n) == views.names[label] and n in targets["train"] for n in nodes) >= 3
                 seen += 1
-            elif said == NOTHING:
+            elif label == NOTHING:
                 assert sum(node in called for node in nodes) <= 1
     assert seen > 20
 
 
 def test_looks_about_are_taken_near_where_references_lead_and_turned_at_random(looks):
-    part, found = looks
+    part, views = looks
     followed = read_index(part.data, Selection(("id_train",), scenes=(part.scene,)), "train")
     places = np.concatenate([followed.poses_of(k)[:, :3] for k in range(len(followed))])
-    apart = np.linalg.norm(found.pose[:, None, :3] - places[None], axis=2).min(axis=1)
-    assert 0.2 < np.median(apart) < apart.max() <= 3.0
+    away_m = np.linalg.norm(views.pose[:, None, :3] - places[None], axis=2).min(axis=1)
+    assert 0.2 < np.median(away_m) < away_m.max() <= 3.0
     space = flight_space(*mesh_of(part.data, part.scene), 0.25)
-    for pose in found.pose.astype(np.float64):
+    for pose in views.pose.astype(np.float64):
         # A look may be at a contact: single precision moves it by some micrometres.
         assert space.grid.distance_m(pose[:3]) > 0.25 - 0.01
-    assert (found.blocked == blocked_at(space, found.pose)).all()
-    assert set(found.scene) == {part.scene}
-    assert (found.first == np.arange(61)).all()
+    assert (views.blocked == blocked_at(space, views.pose)).all()
+    assert set(views.scene) == {part.scene}
+    assert (views.first == np.arange(61)).all()
     # All four quarters, each by more than a tenth.
-    assert np.bincount(((found.pose[:, 3] + np.pi) // (np.pi / 2)).astype(int), minlength=4).min() > 6
+    assert np.bincount(((views.pose[:, 3] + np.pi) // (np.pi / 2)).astype(int), minlength=4).min() > 6
     # Poses are kept in single precision: an edge may fall on the other side of a pixel's middle.
-    assert (parts.pictures(part, found.pose[:5].astype(np.float64)) == found.frames[:5]).mean() > 0.99
-    assert len(np.unique(found.frames.reshape(60, -1), axis=0)) > 50
+    assert (parts.pictures(part, views.pose[:5].astype(np.float64)) == views.frames[:5]).mean() > 0.99
+    assert len(np.unique(views.frames.reshape(60, -1), axis=0)) > 50
 
 
 def test_who_sees_the_goal_is_led_to_it(looks):
-    part, found = looks
+    part, views = looks
     size_of, columns = [f"size_{axis}_m" for axis in "xyz"], ("name", "x_m", "y_m", "z_m")
     rows = store.read_scene(part.data, "release/objects", part.scene, (*columns, *size_of)).to_pylist()
     names = [row["name"] for row in rows]
     known = {row["name"]: row for row in rows if names.count(row["name"]) == 1}
     off = []
-    for pose, frames, shown in zip(found.pose, found.frames, found.shown, strict=True):
+    for pose, frames, shown in zip(views.pose, views.frames, views.shown, strict=True):
         away_m = patch_rays(SENSORS) * patch_depths_m(frames, SENSORS.max_depth_m)[:, None]
         distance_m = np.linalg.norm(away_m, axis=1)
         near = np.where((distance_m > 0.0) & (distance_m < 12.0), shown, NOTHING)
         for number in np.unique(near[near >= 0]).tolist():
-            row = known.get(str(found.names[number]))
+            row = known.get(str(views.names[number]))
             if row is None or (near == number).sum() < 3:
                 continue
             # From another pose the same sighting leads to the same place.
@@ -157,7 +157,7 @@ def turned(away, yaw):
 
 
 # The patches ahead and to the left.
-AHEAD, LEFT = (int(np.linalg.norm(patch_rays(SENSORS) - way, axis=1).argmin()) for way in ([1, 0, 0], [0, 1, 0]))
+AHEAD, LEFT = (int(np.linalg.norm(patch_rays(SENSORS) - ray, axis=1).argmin()) for ray in ([1, 0, 0], [0, 1, 0]))
 
 
 def looking(search, odometry, distance_m, chances):

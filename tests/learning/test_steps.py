@@ -76,10 +76,10 @@ def test_a_batch_has_each_episodes_own_steps_and_goal(pool, by_image):
         number, own = divmod(int(pool.nav_id[k][3:]), 10)
         alone, last = len(LENGTHS[number]) == 1, own == len(LENGTHS[number]) - 1
         # The first of a part has no semantic instance, the last no picture unless it is alone.
-        told = (by_image or own == 0) and (alone or not last)
-        assert batch["goal_by_image"][i] == told
-        assert batch["images"][i, 0, 0, 0] == (10 * number + own if told else 0)
+        shown = (by_image or own == 0) and (alone or not last)
+        assert batch["goal_by_image"][i] == shown
+        assert batch["images"][i, 0, 0, 0] == (10 * number + own if shown else 0)
         assert batch["scene"][i] == (number + own) % 2
         # A description goes with the words alone: it would tell what the picture shows.
         words = [WORDS[n - 2] for n in batch["tokens"][i].tolist() if n]
-        assert words == [f"thing{number}{own}", *([] if told else ["red"])]
+        assert words == [f"thing{number}{own}", *([] if shown else ["red"])]

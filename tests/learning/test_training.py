@@ -53,7 +53,6 @@ torch = pytest.importorskip("torch", reason="PyTorch is not installed: it is the
 
 from aerialdojo_gen.learning.network import pose_loss  # noqa: E402 - it needs torch
 
-POLICY = "policy"
 TEXT = """
 name = "small"
 [data]
@@ -101,7 +100,7 @@ def test_eight_trajectories_are_learned_by_heart_and_flown(smoke, cache, tmp_pat
     assert history(learned.policy.parent)[-1]["accuracy"] > 0.95
     assert learned.imitation.is_file()
     options = {"weights": str(learned.policy)}
-    evaluate(smoke, Evaluation("learned", POLICY, options, Selection(("id_train",))), out=tmp_path, workers=1)
+    evaluate(smoke, Evaluation("learned", "policy", options, Selection(("id_train",))), out=tmp_path, workers=1)
     rows = read_run(tmp_path, "learned").to_pylist()
     index = read_index(open_root(smoke), Selection(("id_train",)))
     eight = set(index.take(sample_evenly(index, 8, 0)).nav_id)
@@ -221,10 +220,10 @@ def test_a_map_is_learned_from_looks_about_too(smoke, cache, tmp_path):
 
 
 def test_weights_of_another_action_set_or_release_are_refused_with_both_fingerprints(smoke, learned, tmp_path):
-    def fly(options=(), **said):
-        path = rewritten(learned.policy, tmp_path / "changed.safetensors", **said)
+    def fly(options=(), **changed):
+        path = rewritten(learned.policy, tmp_path / "changed.safetensors", **changed)
         chosen = Selection(("id_train",), limit=1)
-        evaluation = Evaluation("refused", POLICY, {"weights": str(path), **dict(options)}, chosen)
+        evaluation = Evaluation("refused", "policy", {"weights": str(path), **dict(options)}, chosen)
         return evaluate(smoke, evaluation, out=tmp_path / "log", workers=1)
 
     with pytest.raises(UsageError, match=r"another action set: its fingerprint is f{16}, and .* [0-9a-f]{16}"):
@@ -234,7 +233,7 @@ def test_weights_of_another_action_set_or_release_are_refused_with_both_fingerpr
     assert fly({"any_release": True}, release="e" * 64).finished == 1
 
 
-def test_what_is_no_policy_is_said_in_a_line(tmp_path, learned):
+def test_what_is_no_policy_is_refused_in_a_line(tmp_path, learned):
     with pytest.raises(UsageError, match="there are no weights"):
         read_weights(tmp_path / "none.safetensors")
     cut = tmp_path / "cut.safetensors"
@@ -267,17 +266,17 @@ def test_the_teachers_labels_are_the_planners_own_plan():
     planner, teacher = Planner(world), Teacher(world)
     goal, *starts = free_poses(planner.grid, np.random.default_rng(1), 5)
     with teacher.cache_fields():
-        ways = teacher.plan([goal] * len(starts), starts)
-        for start, way in zip(starts, ways, strict=True):
+        plans = teacher.plan([goal] * len(starts), starts)
+        for start, plan in zip(starts, plans, strict=True):
             route = planner.plan_one(goal, start)
             assert route.outcome == "SOLVED"
-            assert way[0] == agent_actions(route.actions)[0]
+            assert plan[0] == agent_actions(route.actions)[0]
             episode = Episode(FlightSpace(world, 0.25), tuple(start), tuple(goal[:3]), 300)
             while episode.termination is None:
                 pose = np.array([*episode.position, episode.yaw_rad])
-                (way,) = teacher.plan([goal], [pose])
-                assert len(way)
-                episode.step(int(way[0]))
+                (plan,) = teacher.plan([goal], [pose])
+                assert len(plan)
+                episode.step(int(plan[0]))
             assert episode.termination == "stop"
             assert episode.distance_m <= 1.0 + 1e-6
             assert episode.path_length_m <= route.length_m * 1.02 + 0.1
@@ -373,14 +372,7 @@ def flown(root, net, sensors, index, k, led):
 def test_told_where_goals_are_it_flies_there_though_its_map_knows_nothing(smoke, tmp_path):
     root = open_root(smoke)
     # The map learns nothing: where the goal is, is told or not known at all.
-    thorough = {
-        "epochs": 16,
-        "batch_steps": 256,
-        "learning_rate": 3e-3,
-        "goal_weight": 0.0,
-        "looks": 256,
-        "checkpoint_s": 60,
-    }
+    thorough = {"epochs": 16, "batch_steps": 256, "learning_rate": 3e-3, "goal_weight": 0.0, "looks": 256}
     data = {"views": ["front", "down"], "limit": None, "validation_share": 0.02}
     own = recipe(data=data, model=LARGER | {"word_features": 16}, train=thorough)
     policy = train_here(smoke, own, tmp_path / "out", tmp_path / "cache").policy

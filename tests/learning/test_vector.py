@@ -60,8 +60,10 @@ def test_gymnasiums_checker_finds_nothing_in_the_wrappers(smoke):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         warnings.filterwarnings("ignore", message=".*not.*unwrapped|.*spec.*|.*render_modes.*|.*is different from.*")
-        for one in (env, Flattened(env)):
+        for one in (env, flat := Flattened(env)):
             check_env(one, skip_render_check=True)
+    shapes = {name: space.shape for name, space in flat.observation_space.items()}
+    assert (shapes["rgb"], shapes["depth_m"]) == ((16, 16, 6), (16, 16, 2))
 
 
 def test_stable_baselines_checker_takes_what_it_can_take(smoke):

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from aerialdojo_gen.geometry.motion import replay
 from aerialdojo_gen.learning.encoding import DeadReckoning
+from aerialdojo_gen.learning.labels import to_body_frame
 
 torch = pytest.importorskip("torch", reason="PyTorch is not installed: it is the extra 'train'")
 
@@ -26,17 +27,13 @@ def flight():
     for action in [*actions, 0]:
         moved.append(reckoning.odometry)
         reckoning.add(int(action))
-    away, yaw = GOAL - poses[:, :3], poses[:, 3]
-    ahead = (away[:, 0] + 1j * away[:, 1]) * np.exp(-1j * yaw)
-    offset = np.column_stack([ahead.real, ahead.imag, away[:, 2]])
-    return {
-        name: torch.from_numpy(np.asarray(value, np.float32)[None])
-        for name, value in {"pose": poses, "odometry": moved, "offset": offset}.items()
-    } | {"mask": torch.ones((1, T), dtype=torch.bool), "scene": torch.tensor([1])}
+    columns = {"pose": poses, "odometry": moved, "offset": to_body_frame(poses, GOAL)}
+    rows = {name: torch.from_numpy(np.asarray(value, np.float32)[None]) for name, value in columns.items()}
+    return rows | {"mask": torch.ones((1, T), dtype=torch.bool), "scene": torch.tensor([1])}
 
 
-def told(value, centres, width):
-    """Logits of intervals that have this mean: of the two whose middles it lies between."""
+def interval_logits(value, centres, width):
+    """Logits of intervals that have this mean: of the two whose middles are next to it."""
     near = (1.0 - (value[..., None] - centres).abs() / width).clamp(min=0.0)
     return near.log().clamp(min=-80.0)
 
@@ -44,14 +41,15 @@ def told(value, centres, width):
 def place_logits(place):
     x, y, z = place.unbind(-1)
     plane, level = torch.arange(64) * 4.0 - 126.0, torch.arange(36) * 2.0 - 23.0
-    return torch.cat([told(x, plane, 4.0), told(y, plane, 4.0), told(z, level, 2.0)], dim=-1)
+    axes = (x, plane, 4.0), (y, plane, 4.0), (z, level, 2.0)
+    return torch.cat([interval_logits(*axis) for axis in axes], dim=-1)
 
 
 def heading_logits(yaw):
     """So steep that the mean of the two sectors about it is the yaw, to a hundredth of a degree."""
     sectors = torch.deg2rad(torch.arange(24) * 15.0 - 172.5)
-    apart = torch.rad2deg(torch.remainder(yaw[..., None] - sectors + np.pi, 2 * np.pi) - np.pi).abs() / 15.0
-    return (1.0 - apart).clamp(min=0.0).log().clamp(min=-80.0)
+    off = torch.rad2deg(torch.remainder(yaw[..., None] - sectors + np.pi, 2 * np.pi) - np.pi).abs() / 15.0
+    return (1.0 - off).clamp(min=0.0).log().clamp(min=-80.0)
 
 
 def scene_logits(number=1):
@@ -59,10 +57,10 @@ def scene_logits(number=1):
 
 
 def error_m(flight, place, yaw, goal, trust):
-    """How far off the goal is of whereabouts that guess this at every step."""
+    """How far off the goal's offset is where a localization guesses this at every step."""
     made = Localization(4, 4, 4, SCENES)
     body = torch.cat([place_logits(place), heading_logits(yaw), scene_logits(), trust], dim=-1)
-    # In the place of layers: what they would say.
+    # In the place of layers: their outputs.
     for name, value in (("body", body), ("target", place_logits(goal))):
         delattr(made, name)
         setattr(made, name, lambda _, value=value: value)
@@ -75,21 +73,20 @@ def truth(flight):
     return flight["pose"][..., :3].clone(), flight["pose"][..., 3].clone(), goal
 
 
-def test_what_intervals_tell_is_a_place_and_a_direction():
+def test_logits_of_intervals_have_a_mean_place_and_direction():
     draw = torch.Generator().manual_seed(2)
     wide = torch.tensor([120.0, 120.0, 20.0])
     place = (torch.rand(200, 3, generator=draw) * 2.0 - 1.0) * wide
-    found, spread = networks.places(place_logits(place))
-    assert torch.allclose(found, place, atol=1e-3)
+    mean, spread = networks.places(place_logits(place))
+    assert torch.allclose(mean, place, atol=1e-3)
     # Of two intervals at most half of one; who has no idea is a quarter of all intervals off, and more.
     assert float((spread / torch.tensor([4.0, 4.0, 2.0])).max()) <= 0.5 + 1e-3
     assert bool((networks.places(torch.zeros(5, 164))[1] > torch.tensor([70.0, 70.0, 20.0])).all())
     yaw = (torch.rand(200, generator=draw) * 2.0 - 1.0) * np.pi
-    found = networks.directions(heading_logits(yaw))
-    length = torch.linalg.vector_norm(found, dim=-1)
-    assert float(length.min()) > 10.0
+    mean = networks.directions(heading_logits(yaw))
+    assert float(torch.linalg.vector_norm(mean, dim=-1).min()) > 10.0
     assert float(networks.directions(torch.zeros(1, 24)).abs().max()) < 1e-5
-    turned = torch.atan2(found[:, 1], found[:, 0]) - yaw
+    turned = torch.atan2(mean[:, 1], mean[:, 0]) - yaw
     assert float((torch.remainder(turned + np.pi, 2 * np.pi) - np.pi).abs().max()) < np.deg2rad(0.1)
 
 
@@ -147,16 +144,16 @@ def test_flown_step_by_step_it_chooses_as_it_learned(episode):
         memory, pictures = None, given["pictures"].reshape(2, T, 1, 32, 32, 4)
         for k in range(T):
             at = [given[name][:, k : k + 1] for name in ("odometry", "mask")]
-            thought, memory = network(pictures[:, k], goal, *at, memory)
-            assert torch.allclose(thought.logits[:, 0], all_at_once.logits[:, k], atol=1e-5)
-            assert torch.allclose(thought.estimate.offset[:, 0], all_at_once.estimate.offset[:, k], atol=1e-4)
+            output, memory = network(pictures[:, k], goal, *at, memory)
+            assert torch.allclose(output.logits[:, 0], all_at_once.logits[:, k], atol=1e-5)
+            assert torch.allclose(output.estimate.offset[:, 0], all_at_once.estimate.offset[:, k], atol=1e-4)
     assert torch.allclose(memory, end, atol=1e-5)
 
 
 def test_choices_teach_the_guess_nothing(episode):
     network, goal, given = episode
-    thought, _ = network(goal=goal.detach(), **given)
-    thought.logits.sum().backward()
+    output, _ = network(goal=goal.detach(), **given)
+    output.logits.sum().backward()
     assert all(p.grad is None or not p.grad.any() for p in network.whereabouts.parameters())
     assert network.choice[0].weight.grad.any()
 
@@ -204,7 +201,7 @@ def test_what_was_refused_is_not_tried_again_from_there():
 @example([14] * 12 + [10], 12)
 @example([2, *[15] * 6] * 4, 2)  # about a square: its last side leads to where it began
 @given(st.lists(st.integers(1, 15), max_size=40), st.integers(1, 15))
-def test_only_what_leads_back_is_said_to(actions, last):
+def test_only_what_leads_back_is_marked_so(actions, last):
     """By poses that are replayed: the same place and heading as before, or turns beyond half a circle."""
     reckoning = DeadReckoning()
     for action in actions:
@@ -214,11 +211,11 @@ def test_only_what_leads_back_is_said_to(actions, last):
     turned = np.abs(np.angle(np.exp(1j * (been[:, 3] - there[3])))) < 1e-6
     near = np.linalg.norm(been[:, :3] - there[:3], axis=1)
     # Rounded to a grid, so that places half a step apart are one or two.
-    same, apart = bool((turned & (near < 1e-6)).any()), not (turned & (near < 0.5)).any()
+    same, distinct = bool((turned & (near < 1e-6)).any()), not (turned & (near < 0.5)).any()
     in_a_row = next((k for k, a in enumerate(reversed(actions)) if a < 14), len(actions))
     if last >= 14 and in_a_row >= 12:
         assert reckoning.back[last]
-    elif same or apart:
+    elif same or distinct:
         assert reckoning.back[last] == same
 
 
