@@ -14,19 +14,7 @@ from typer.core import TyperGroup
 
 from aerialdojo_gen.base import cli_context, environment_errors, memory, terminal
 from aerialdojo_gen.base.errors import AerialDojoError
-from aerialdojo_gen.cli import (
-    config,
-    evaluate,
-    exchange,
-    leaderboard,
-    places,
-    release,
-    render,
-    report,
-    sources,
-    stages,
-    validate,
-)
+from aerialdojo_gen.cli import evaluate, exchange, places, release, render, report, sources, stages, validate
 
 _HEADINGS = {
     "Look at a dataset": ("stats", "show", "view", "gallery", "validate"),
@@ -91,12 +79,10 @@ def _program(
     """Accept options before the command."""
 
 
-_GROUPS = (
-    stages, render, sources, places, evaluate, release, validate, exchange, report, leaderboard
-)  # fmt: skip
+_GROUPS = (stages, render, sources, places, evaluate, release, validate, exchange, report)
 for _group in _GROUPS:
     app.add_typer(_group.app)
-app.add_typer(config.app, name="config", cls=_Commands)
+app.add_typer(stages.config_app, name="config", cls=_Commands)
 
 
 def _app_for(named: list[str]) -> typer.Typer:

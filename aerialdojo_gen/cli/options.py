@@ -1,21 +1,84 @@
-"""The options that several commands have."""
+"""The options that several commands have, and what a shell offers for them after a tab."""
 
 from __future__ import annotations
 
+import contextlib
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import typer
 
 from aerialdojo_gen.base import cli_context
-from aerialdojo_gen.cli import completion
+from aerialdojo_gen.base.shipped import home
 from aerialdojo_gen.dataset.build import DEFAULT_PIPELINE
+from aerialdojo_gen.store.root import open_root
+
+
+def shipped_pipelines() -> list[str]:
+    """Return the names of the pipelines that come with the program."""
+    return sorted(file.stem for file in (home() / "pipelines").glob("*.toml"))
+
+
+def complete_pipelines(incomplete: str) -> list[str]:
+    """Offer the names of the pipelines that come with the program, and files in reach of what is written."""
+    return [name for name in [*shipped_pipelines(), *_files(incomplete)] if name.startswith(incomplete)]
+
+
+def complete_scenes(ctx: typer.Context, incomplete: str) -> list[str]:
+    """Offer the scenes of the pipeline that is named, else of the release in the data directory, else all recipes."""
+    return [name for name in _scenes(ctx) if name.startswith(incomplete)]
+
+
+def complete_agents(incomplete: str) -> list[str]:
+    """Offer the agents that come with the program."""
+    from aerialdojo_gen.benchmark.agents.load import BUILT_IN
+
+    return [name for name in BUILT_IN if name.startswith(incomplete)]
+
+
+def _scenes(ctx: typer.Context) -> list[str]:
+    from aerialdojo_gen.base.errors import AerialDojoError
+
+    # A tab is no place for an error's line.
+    with contextlib.suppress(AerialDojoError, OSError):
+        pipeline, data = ctx.params.get("pipeline"), str(ctx.params.get("data") or "")
+        if pipeline:
+            from aerialdojo_gen.dataset.build import open_pipeline
+            from aerialdojo_gen.pipeline.runner import known_scenes
+
+            return known_scenes(open_pipeline(pipeline, "data")[1].recipes)
+        if "://" not in data and (released := _released(Path(data or "data"))):
+            return released
+    return sorted(file.stem for file in (home() / "scene_assets" / "scenes").glob("*.toml"))
+
+
+def _released(data: Path) -> list[str]:
+    from aerialdojo_gen.dataset.contents import existing_scenes
+
+    return list(existing_scenes(open_root(data))) if data.is_dir() else []
+
+
+def _files(incomplete: str) -> Iterator[str]:
+    folder = Path(incomplete) if incomplete.endswith("/") else Path(incomplete).parent
+    with contextlib.suppress(OSError):
+        for entry in sorted(folder.iterdir()):
+            shown = str(entry) if folder != Path() or not incomplete.startswith("./") else f"./{entry}"
+            if entry.suffix == ".toml":
+                yield shown
+            elif entry.is_dir() and any(entry.glob("*.toml")):
+                yield f"{shown}/"
+
+
+def is_typed(ctx: typer.Context, option: Any) -> bool:
+    """Whether an option is from the command line, not from the environment and no default."""
+    source = ctx.get_parameter_source(str(option.name))
+    return source is not None and source.name == "COMMANDLINE"
 
 
 def remember_option(ctx: typer.Context, param: typer.CallbackParam, value: Any) -> Any:
     """Keep the options of the command line (not the environment's) for commands in messages."""
-    source = ctx.get_parameter_source(str(param.name))
-    if source is not None and source.name == "COMMANDLINE":
+    if is_typed(ctx, param):
         cli_context.update_context(**{str(param.name): value})
     return value
 
@@ -32,13 +95,13 @@ Scene = Annotated[
     typer.Option(
         "--scene",
         metavar="NAME|GLOB",
-        autocompletion=completion.scenes,
+        autocompletion=complete_scenes,
         help="Scene or glob, repeatable: --scene 'U_*'.  (default: all)",
     ),
 ]
 Scenes = Annotated[
     list[str] | None,
-    typer.Argument(metavar="SCENE", autocompletion=completion.scenes, help="Scenes or globs; the same as --scene."),
+    typer.Argument(metavar="SCENE", autocompletion=complete_scenes, help="Scenes or globs; the same as --scene."),
 ]
 # Which tasks are flown.
 Split = Annotated[
@@ -82,7 +145,7 @@ PipelineFile = Annotated[
         "--pipeline",
         metavar="FILE|NAME",
         callback=remember_option,
-        autocompletion=completion.pipelines,
+        autocompletion=complete_pipelines,
         help="Pipeline file, or the name of a shipped one.  (default: that of the release in --data, "
         f"else {Path(DEFAULT_PIPELINE).stem})",
     ),
@@ -92,8 +155,8 @@ PipelineArgument = Annotated[
     typer.Argument(
         metavar="PIPELINE",
         callback=remember_option,
-        autocompletion=completion.pipelines,
-        help=f"Pipeline file, or the name of a shipped one: {', '.join(completion.shipped_pipelines())}.",
+        autocompletion=complete_pipelines,
+        help=f"Pipeline file, or the name of a shipped one: {', '.join(shipped_pipelines())}.",
     ),
 ]
 Workers = Annotated[
@@ -122,11 +185,11 @@ Replace = Annotated[
 Json = Annotated[bool, typer.Option("--json", help="Print JSON with unrounded figures.")]
 OneScene = Annotated[
     str | None,
-    typer.Argument(metavar="SCENE", autocompletion=completion.scenes, help="Scene, or a glob that matches one."),
+    typer.Argument(metavar="SCENE", autocompletion=complete_scenes, help="Scene, or a glob that matches one."),
 ]
 SceneOption = Annotated[
     str | None,
-    typer.Option("--scene", metavar="NAME|GLOB", autocompletion=completion.scenes, help="The same as SCENE."),
+    typer.Option("--scene", metavar="NAME|GLOB", autocompletion=complete_scenes, help="The same as SCENE."),
 ]
 RendererName = Annotated[
     Literal["auto", "gl", "pybullet"],

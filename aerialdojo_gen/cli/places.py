@@ -93,7 +93,7 @@ def vary(
     seeds: Annotated[
         str, typer.Option(help="FIRST:END; 0 to 199 are test worlds, 200 to 999 validation, from 1000 training.")
     ],
-    out: Annotated[Path, typer.Option("--out", help="Folder for the plans, annotations and pipeline.")],
+    out: Annotated[Path, typer.Option(help="Folder for the plans, annotations and pipeline.")],
     knob: Annotated[
         list[str] | None,
         typer.Option(metavar="NAME=VALUE", help="Set a quantity that is drawn otherwise; repeatable."),

@@ -12,7 +12,8 @@ import typer
 from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.base.text_table import facts, terminal_width
 from aerialdojo_gen.cli import options
-from aerialdojo_gen.cli.common import json_text, merge_scenes, open_pipeline, print_json
+from aerialdojo_gen.cli.common import json_text, merge_scenes, print_json
+from aerialdojo_gen.dataset.build import open_pipeline
 from aerialdojo_gen.store.atomic import atomic_file
 from aerialdojo_gen.store.root import DataRoot, open_root
 

@@ -14,7 +14,8 @@ from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.base.names import choose_scenes, closest
 from aerialdojo_gen.base.text_table import terminal_width
 from aerialdojo_gen.cli import options
-from aerialdojo_gen.cli.common import key_values, merge_scenes, open_pipeline, pipeline_file, print_scene
+from aerialdojo_gen.cli.common import key_values, merge_scenes, print_scene
+from aerialdojo_gen.dataset.build import open_pipeline, pipeline_file
 from aerialdojo_gen.store.atomic import make_folder
 from aerialdojo_gen.store.root import open_root
 
@@ -59,10 +60,7 @@ def add_scene(
         str, typer.Option(help="Lighting of textures: sun (lit by the scene), baked (already in them) or auto.")
     ] = "auto",
     texture_px: Annotated[
-        int,
-        typer.Option(
-            "--texture-px", min=16, max=8192, help="Maximum texture side, pixels; larger textures are reduced."
-        ),
+        int, typer.Option(min=16, max=8192, help="Maximum texture side, pixels; larger textures are reduced.")
     ] = 8192,
     force: Annotated[bool, typer.Option("--force", help="Replace a scene of this name.")] = False,
     show: Annotated[
@@ -102,22 +100,6 @@ def _describe(added: AddedScene) -> None:
     print_scene(added.scene, added.repairs.lines)
 
 
-Rewrite = Annotated[
-    str | None,
-    typer.Option(
-        metavar="openai|anthropic",
-        help="Let a language model write the descriptions; those that cannot be verified are dropped.",
-    ),
-]
-ModelOption = Annotated[
-    list[str] | None,
-    typer.Option("--option", help="Option of --rewrite, repeatable: --option model=…, --option base_url=…"),
-]
-Yes = Annotated[bool, typer.Option("--yes", help="Send the requests of --rewrite, whatever they cost.")]
-MaxTokens = Annotated[int | None, typer.Option(min=0, help="Ask --rewrite no more after this number of tokens.")]
-MaxCost = Annotated[float | None, typer.Option(min=0, help="Ask --rewrite no more after this cost, US dollars.")]
-
-
 @app.command("annotate-draft")
 def annotate_draft(
     name: options.OneScene = None,
@@ -148,19 +130,30 @@ def annotate_draft(
     max_per_category: Annotated[
         int | None,
         typer.Option(
-            min=1,
-            help="Maximum number of objects per other category.  (default: 5; more if a scene has few)",
+            min=1, help="Maximum number of objects per other category.  (default: 5; more if a scene has few)"
         ),
     ] = None,
     landmark: Annotated[list[str] | None, typer.Option(help="Node to use as a landmark; repeatable.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed; the same seed gives the same draft.")] = 0,
     pipeline: options.PipelineFile = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")] = False,
-    rewrite: Rewrite = None,
-    option: ModelOption = None,
-    yes: Yes = False,
-    max_tokens: MaxTokens = None,
-    max_cost: MaxCost = None,
+    rewrite: Annotated[
+        str | None,
+        typer.Option(
+            metavar="openai|anthropic",
+            help="Let a language model write the descriptions; those that cannot be verified are dropped.",
+        ),
+    ] = None,
+    option: Annotated[
+        list[str] | None, typer.Option(help="Option of --rewrite, repeatable: --option model=…, --option base_url=…")
+    ] = None,
+    yes: Annotated[bool, typer.Option("--yes", help="Send the requests of --rewrite, whatever they cost.")] = False,
+    max_tokens: Annotated[
+        int | None, typer.Option(min=0, help="Ask --rewrite no more after this number of tokens.")
+    ] = None,
+    max_cost: Annotated[
+        float | None, typer.Option(min=0, help="Ask --rewrite no more after this cost, US dollars.")
+    ] = None,
     quiet: options.Quiet = False,
 ) -> None:
     """Draft a scene's annotations, for you to check and commit."""
@@ -214,7 +207,7 @@ def _writer(protocol: str, option: list[str], max_cost: float | None) -> Languag
 @app.command("gallery")
 def gallery(
     scenes: options.Scenes = None,
-    out: Annotated[Path, typer.Option("--out", help="Folder for the pictures.")] = Path("docs/gallery"),
+    out: Annotated[Path, typer.Option(help="Folder for the pictures.")] = Path("docs/gallery"),
     scene: options.Scene = None, pipeline: options.PipelineFile = None,
     props: Annotated[bool, typer.Option("--props/--no-props", help="Draw the sheets of props too.")] = True,
     small: Annotated[bool, typer.Option("--small", help="Write JPEGs 1280 pixels wide, for web pages.")] = False,
@@ -322,7 +315,7 @@ def annotate(
     ] = "127.0.0.1",
     browser: options.Browser = True,
     coco: Annotated[
-        Path | None, typer.Option("--coco", help="Write boxes and pictures to this COCO archive (ZIP) and exit.")
+        Path | None, typer.Option(help="Write boxes and pictures to this COCO archive (ZIP) and exit.")
     ] = None,
 ) -> None:
     """Annotate a scene in the browser: landmarks, objects and their anchors."""

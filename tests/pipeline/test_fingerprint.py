@@ -7,7 +7,7 @@ import shutil
 import pyarrow.parquet as pq
 import pytest
 
-from aerialdojo_gen.cli.common import open_pipeline
+from aerialdojo_gen.dataset.build import open_pipeline
 from aerialdojo_gen.pipeline import fingerprint
 from aerialdojo_gen.pipeline.registry import BY_NAME
 from aerialdojo_gen.store import shards as store

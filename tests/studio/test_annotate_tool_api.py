@@ -15,7 +15,7 @@ from support.annotating import AUTHOR, YARD
 from aerialdojo_gen.base.constants import DIRECTIONS
 from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.base.pictures import decode_rgb
-from aerialdojo_gen.cli.common import open_pipeline
+from aerialdojo_gen.dataset.build import open_pipeline
 from aerialdojo_gen.studio.annotate.coco import write_coco
 from aerialdojo_gen.studio.annotate.server import STATIC, TokenGate, make_app, serve_session
 from aerialdojo_gen.studio.annotate.session import AnnotationSession, open_session

@@ -21,8 +21,7 @@ from support.browser import until
 from support.hills import CELL_M, Hills
 
 from aerialdojo_gen.base.errors import AssetError
-from aerialdojo_gen.cli.common import open_pipeline
-from aerialdojo_gen.dataset.build import run_pipeline
+from aerialdojo_gen.dataset.build import open_pipeline, run_pipeline
 from aerialdojo_gen.imports.command import add_scene
 from aerialdojo_gen.imports.import_mesh import MeshOptions
 from aerialdojo_gen.scenes.build import build_scene, cut_out
