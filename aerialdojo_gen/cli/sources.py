@@ -20,8 +20,10 @@ from aerialdojo_gen.store.atomic import make_folder
 from aerialdojo_gen.store.root import open_root
 
 if TYPE_CHECKING:
+    from aerialdojo_gen.base.config.pipeline import Pipeline
     from aerialdojo_gen.benchmark.llm.agent import LanguageModelAgent
     from aerialdojo_gen.imports.command import AddedScene
+    from aerialdojo_gen.pipeline.stage import ProjectPaths
 
 app = typer.Typer()
 
@@ -160,11 +162,9 @@ def annotate_draft(
     from aerialdojo_gen.annotations.draft import DraftOptions
     from aerialdojo_gen.imports.drafting import draft_scene
     from aerialdojo_gen.pipeline.progress import Reporter
-    from aerialdojo_gen.pipeline.runner import chosen_scenes, known_scenes
 
     config, roots = open_pipeline(pipeline_file(pipeline), Path("data"))
-    given = named_scene(name, scene)
-    scene = pick_scene(given, known_scenes(roots.recipes) if given else chosen_scenes(config, roots))
+    scene = _one_scene(name, scene, config, roots)
     options = DraftOptions(
         landmarks=tuple(landmark or ()),
         n_landmarks=landmarks,
@@ -271,6 +271,14 @@ def named_scene(position: str | None, option: str | None) -> str | None:
     return position or option
 
 
+def _one_scene(position: str | None, option: str | None, config: Pipeline, roots: ProjectPaths) -> str:
+    """Return the scene that is named, by any recipe's name, else one of the pipeline's that is picked."""
+    from aerialdojo_gen.pipeline.runner import chosen_scenes, known_scenes
+
+    given = named_scene(position, option)
+    return pick_scene(given, known_scenes(roots.recipes) if given else chosen_scenes(config, roots))
+
+
 def pick_scene(
     given: str | None, known: Sequence[str], stdin: TextIO | None = None, stderr: TextIO | None = None
 ) -> str:
@@ -323,12 +331,10 @@ def annotate(
 
     if coco is None:
         require_web()
-    from aerialdojo_gen.pipeline.runner import chosen_scenes, known_scenes
     from aerialdojo_gen.studio.annotate.session import open_session
 
     config, roots = open_pipeline(pipeline, data)
-    given = named_scene(name, scene)
-    scene = pick_scene(given, known_scenes(roots.recipes) if given else chosen_scenes(config, roots))
+    scene = _one_scene(name, scene, config, roots)
     session = open_session(scene, config, roots)
     if coco is not None:
         from aerialdojo_gen.studio.annotate.coco import write_coco

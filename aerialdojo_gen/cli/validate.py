@@ -28,15 +28,7 @@ _MANY_DIGITS = 10
 @app.command("validate")
 def validate(
     scenes: options.Scenes = None,
-    data: Annotated[
-        str,
-        typer.Option(
-            metavar="DIR|URL",
-            envvar="AERIALDOJO_DATA",
-            callback=options.remember_option,
-            help="Data directory or s3://bucket/prefix; its release is checked.",
-        ),
-    ] = "data",
+    data: options.Data = "data",
     elsewhere: Annotated[
         str | None,
         typer.Option("--release", metavar="DIR|URL", help="Another release to check.  (default: the one in --data)"),

@@ -20,7 +20,8 @@ from fastapi import FastAPI, Header, Query, Request
 from fastapi.responses import JSONResponse, PlainTextResponse, RedirectResponse, Response
 from fastapi.staticfiles import StaticFiles
 from pydantic import Field, StrictFloat, StrictStr, field_validator
-from starlette.types import ASGIApp, Receive, Scope, Send
+from starlette.middleware.base import BaseHTTPMiddleware, RequestResponseEndpoint
+from starlette.types import ASGIApp
 
 from aerialdojo_gen.annotations.format import Strict
 from aerialdojo_gen.base.errors import AerialDojoError, AnnotationError, StoreError, UsageError
@@ -36,8 +37,8 @@ MAX_FAILED_LOGINS, SECONDS_PER_FAILED_LOGIN = 10, 6.0
 _MAX_ADDRESSES = 4096
 
 
-class TokenGate:
-    """ASGI middleware: rejects requests without the token.
+class TokenGate(BaseHTTPMiddleware):
+    """Middleware: rejects requests without the token.
 
     The printed address contains the token; the response stores it in an HttpOnly, SameSite cookie and redirects to
     the address without it. Requests whose ``Origin`` does not match their ``Host`` are rejected. An address that sent
@@ -46,36 +47,32 @@ class TokenGate:
     """
 
     def __init__(self, app: ASGIApp, token: str) -> None:
-        self._app, self._token = app, token
+        super().__init__(app)
+        self._token = token
         self._failed_logins: OrderedDict[str, _FailedLogins] = OrderedDict()
         self._known: set[str] = set()
 
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+    async def dispatch(self, request: Request, call_next: RequestResponseEndpoint) -> Response:
         """Answer 401, 403, 429 or 303 itself, or hand the request on."""
-        if scope["type"] != "http":
-            await self._app(scope, receive, send)
-            return
-        request = Request(scope)
         address = request.client.host if request.client else ""
         failed = self._failed_logins.get(address)
         wait = 0.0 if failed is None else failed.wait(time.monotonic())
         token, cookie = request.query_params.get("token", ""), request.cookies.get(COOKIE, "")
-        answer: Response | None = None
         if wait > 0.0 and address not in self._known:
             seconds = int(wait) + 1
             after = {"retry-after": str(seconds)}
-            answer = PlainTextResponse(f"too many wrong tokens: try again in {seconds} seconds", 429, after)
-        elif scope["path"] == "/" and self._is_token(token):
+            return PlainTextResponse(f"too many wrong tokens: try again in {seconds} seconds", 429, after)
+        if request.scope["path"] == "/" and self._is_token(token):
             self._known.add(address)
             kept = f"{COOKIE}={self._token}; HttpOnly; SameSite=Strict; Path=/"
-            answer = RedirectResponse("/", 303, {"set-cookie": kept})
-        elif not self._is_token(cookie):
+            return RedirectResponse("/", 303, {"set-cookie": kept})
+        if not self._is_token(cookie):
             for given in filter(None, (token, cookie)):
                 self._record_failed_login(address, given)
-            answer = PlainTextResponse("open the address that the command printed; it contains the token", 401)
-        elif request.headers.get("origin") not in (None, f"http://{request.headers.get('host', '')}"):
-            answer = PlainTextResponse("requests from other sites are not allowed", 403)
-        await (answer or self._app)(scope, receive, send)
+            return PlainTextResponse("open the address that the command printed; it contains the token", 401)
+        if request.headers.get("origin") not in (None, f"http://{request.headers.get('host', '')}"):
+            return PlainTextResponse("requests from other sites are not allowed", 403)
+        return await call_next(request)
 
     def _is_token(self, given: str) -> bool:
         return hmac.compare_digest(given.encode("utf-8", "replace"), self._token.encode())

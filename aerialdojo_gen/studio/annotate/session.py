@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
+import json
 import re
+import tempfile
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,15 +19,16 @@ from aerialdojo_gen.annotations.format import Anchor, Object, format_annotations
 from aerialdojo_gen.annotations.phrases import spoken
 from aerialdojo_gen.annotations.vocabulary import Vocabulary
 from aerialdojo_gen.base.config.pipeline import Pipeline
-from aerialdojo_gen.base.errors import AerialDojoError, UsageError
+from aerialdojo_gen.base.errors import AerialDojoError, UsageError, disk_error
 from aerialdojo_gen.base.paper_figures import paper_counts
 from aerialdojo_gen.pipeline.stage import Job, ProjectPaths
 from aerialdojo_gen.rendering.casters import ray_caster
 from aerialdojo_gen.scenes.build import cut_out
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.model import Scene
-from aerialdojo_gen.scenes.recipe import Cut
-from aerialdojo_gen.studio.annotate import boxes
+from aerialdojo_gen.scenes.recipe import Cut, load_imported
+from aerialdojo_gen.store.atomic import atomic_file
+from aerialdojo_gen.store.staging import scratch_folder
 from aerialdojo_gen.studio.annotate.anchors import AnchorService
 from aerialdojo_gen.studio.annotate.describe import Describer
 from aerialdojo_gen.studio.annotate.document import Add, Change, ConflictError, Operation, apply, edits_of, find
@@ -31,6 +36,7 @@ from aerialdojo_gen.studio.annotate.storage import Author, History, Record, Stat
 from aerialdojo_gen.studio.web.payload import scene_payload
 
 _MAX_CHANGES = 200
+_BOX_HEAD = "\n[[imported.cuts]]\n"
 
 
 class AnnotationSession:
@@ -149,13 +155,13 @@ class AnnotationSession:
 
     def about(self, node: str) -> dict[str, Any]:
         """Return what the mesh says about a node."""
-        instance = self.scene[node]
+        instance, imported = self.scene[node], load_imported(self._recipe)
         return {
             "node": node,
             "category": instance.category,
             "word": self._names.get(instance.category, spoken(instance.category)),
             "attributes": instance.attributes,
-            "boxed": node in boxes.nodes(self._recipe),
+            "boxed": imported is not None and node in {cut.node for cut in imported.cuts},
             "size_m": np.ptp(instance.bounds, axis=0).round(2).tolist(),
             **self._describer.place(node),
             **self._describer.bearing(self.storage.load().annotations, node),
@@ -180,7 +186,7 @@ class AnnotationSession:
             node = next(n for k in itertools.count() if (n := f"{slug}_{k:03d}") not in self.scene)
             cut = Cut(node=node, category=slug, low_m=tuple(low.tolist()), high_m=tuple(high.tolist()))
             cut_out(self.scene, (cut,))
-            self._rebuild(boxes.with_box(self._recipe, cut))
+            self._rebuild(_with_box(self._recipe, cut))
         return self.about(node)
 
     def uncut(self, node: str) -> None:
@@ -189,17 +195,17 @@ class AnnotationSession:
         if node in {e.node for e in annotations.landmarks} | {e.node for e in annotations.objects}:
             raise AerialDojoError(f"{node} is annotated: remove its entry first")
         with self._lock, self.storage.locked():
-            self._rebuild(boxes.without_box(self._recipe, node))
+            self._rebuild(_without_box(self._recipe, node))
 
     @property
     def _recipe(self) -> Path:
         return self._roots.recipes / f"{self.storage.scene}.toml"
 
     def _rebuild(self, recipe: str) -> None:
-        with boxes.staged(self._roots, self.storage.scene, recipe) as roots:
+        with _staged(self._roots, self.storage.scene, recipe) as roots:
             build(self.storage.scene, self._pipeline, roots)
         before = self.anchors
-        self._open_scene(commit=lambda: boxes.write(self._recipe, recipe))
+        self._open_scene(commit=lambda: _write(self._recipe, recipe))
         before.close()
 
     def _check_anchor(self, object_id: int, anchor: Anchor) -> None:
@@ -236,3 +242,38 @@ def build(scene: str, pipeline: Pipeline, roots: ProjectPaths) -> None:
     from aerialdojo_gen.pipeline.progress import Reporter
 
     runner.run(runner.stages_named(("build-scenes",)), [scene], pipeline, roots, reporter=Reporter(quiet=True))
+
+
+def _with_box(recipe: Path, cut: Cut) -> str:
+    """Return a recipe's text with a box more."""
+    if load_imported(recipe) is None:
+        raise AerialDojoError("this scene is built from a recipe, every thing in it has a node: boxes are not needed")
+    keys = "".join(f"{key} = {json.dumps(value)}\n" for key, value in cut.model_dump(mode="json").items())
+    return recipe.read_text(encoding="utf-8") + _BOX_HEAD + keys
+
+
+def _without_box(recipe: Path, node: str) -> str:
+    """Return a recipe's text without the box of a node; `AerialDojoError` where there is none."""
+    head, *blocks = recipe.read_text(encoding="utf-8").split(_BOX_HEAD)
+    kept = [block for block in blocks if f"node = {json.dumps(node)}\n" not in block]
+    if len(kept) == len(blocks):
+        raise AerialDojoError(f"{node} was not created by a box")
+    return _BOX_HEAD.join([head, *kept])
+
+
+@contextlib.contextmanager
+def _staged(roots: ProjectPaths, scene: str, text: str) -> Iterator[ProjectPaths]:
+    """Lay a changed recipe out for a build, with the scene's own mesh beside it: one that fails replaces none."""
+    with contextlib.ExitStack() as held:
+        try:
+            folder = held.enter_context(scratch_folder())
+            (folder / f"{scene}.toml").write_text(text, encoding="utf-8")
+            (folder / f"{scene}.glb").symlink_to((roots.recipes / f"{scene}.glb").resolve())
+        except OSError as error:
+            raise disk_error(error, Path(tempfile.gettempdir())) from error
+        yield replace(roots, recipes=folder)
+
+
+def _write(recipe: Path, text: str) -> None:
+    with atomic_file(recipe.parent, recipe.name) as path:
+        path.write_text(text, encoding="utf-8")

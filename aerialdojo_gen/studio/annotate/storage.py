@@ -116,10 +116,6 @@ class Author:
 class StaleError(ConflictError):
     """A change was based on an outdated version of the file."""
 
-    def __init__(self, state: State) -> None:
-        super().__init__("these annotations have been changed by another client")
-        self.state = state
-
 
 class Storage:
     """The annotation file of one scene and its history."""
@@ -192,7 +188,7 @@ class Storage:
             self._recover()
             state = self._load()
             if state.version != version:
-                raise StaleError(state)
+                raise StaleError("these annotations have been changed by another client")
             edits = tuple(edits_of_state(state))
             after = document.apply(state.annotations, edits)
             if not edits:
@@ -204,16 +200,13 @@ class Storage:
                 time=now, who=author.who, client=author.client, action=action, what=document.describe(edits),
                 before=state.version, after=digest, edits=edits,
             )  # fmt: skip
-            lines = [record]
             last_version = self.history.records[-1].after if self.history.records else state.version
-            if last_version != state.version:
-                outside = Record(
-                    time=now, who="", client="", action="outside", what="changed outside of this tool",
-                    before=last_version, after=state.version, edits=(),
-                )  # fmt: skip
-                lines.insert(0, outside)
+            outside = Record(
+                time=now, who="", client="", action="outside", what="changed outside of this tool",
+                before=last_version, after=state.version, edits=(),
+            )  # fmt: skip
             try:
-                self._write(raw, lines)
+                self._write(raw, [record] if last_version == state.version else [outside, record])
             except OSError as error:
                 raise disk_error(error, self.path) from error
             self.history.refresh()

@@ -38,19 +38,17 @@ class Frame:
     recorded: bool  # Whether it comes from a recording
 
 
-def frames_along(task: TaskRecord, count: int) -> list[Frame]:
-    """Return front views at evenly spaced poses of a route, including start and goal."""
+def frames_along(task: TaskRecord, poses: NDArray[np.float64], count: int) -> list[Frame]:
+    """Return front views at evenly spaced poses (K + 1, 4) of a route, including start and goal."""
     if count == 0:
         return []
-    route = task.route
-    poses = np.column_stack([route["x_m"], route["y_m"], route["z_m"], route["yaw_rad"]])
     steps = sorted({round(k) for k in np.linspace(0, len(poses) - 1, count)})
     pictures = _recorded(task, steps)
     recorded = pictures is not None
     if pictures is None:
         pictures = _rendered(task, poses[steps])
     return [
-        Frame(step, schemas.ACTION_NAMES[route["action"][step]], picture, recorded)
+        Frame(step, schemas.ACTION_NAMES[task.route["action"][step]], picture, recorded)
         for step, picture in zip(steps, pictures, strict=True)
     ]
 
@@ -76,10 +74,8 @@ def _recorded(task: TaskRecord, steps: list[int]) -> list[NDArray[np.uint8]] | N
     from aerialdojo_gen.rendering.reader import open_view
 
     frames = store.read_scene(root, "frames", scene, ["nav_id", "frame", "step"])
-    frames = frames.filter(pc.equal(frames["nav_id"], task.nav_id))
-    first: dict[int, int] = {}
-    for frame, step in zip(frames["frame"].to_pylist(), frames["step"].to_pylist(), strict=True):
-        first[step] = min(frame, first.get(step, frame))
+    frames = frames.filter(pc.equal(frames["nav_id"], task.nav_id)).sort_by([("frame", "descending")])
+    first = dict(zip(frames["step"].to_pylist(), frames["frame"].to_pylist(), strict=True))
     if any(step not in first for step in steps):
         return None
     video = open_view(_local_video(root, path), "front", "rgb")
@@ -199,6 +195,6 @@ def picture_task(task: TaskRecord, modality: str = "semantic", frames: int = 5) 
         clearance_m=scene.clearance(way),
         below_m=pictures.surface_below(way),
         reference=decode_rgb(target["reference_image"]),
-        frames=frames_along(task, frames),
+        frames=frames_along(task, poses, frames),
         pictures=pictures,
     )

@@ -16,7 +16,8 @@ from aerialdojo_gen.dataset.release import Release
 
 _ROUTES = ["nav_id", "scene", "setting", "target_object_id", "length_m", "detour_ratio", "min_clearance_m",
            "n_actions", "split"]  # fmt: skip
-_OBJECTS = ["scene", "object_id", "name", "category", "description", "direction", "landmark_id"]
+_OBJECTS = ["object_id", "name", "category", "description", "direction", "landmark_id"]
+_SHOWN = ("name", "category", "description", "direction", "landmark")
 _BEGINS = r"(?:^|[^\pL\pN])"
 ORDERS = ("nav_id", "length_m", "detour_ratio", "min_clearance_m", "n_actions")
 
@@ -33,16 +34,15 @@ class TaskList:
         with self._lock:
             if scene not in self._read:
                 routes = self._release.table("routes", scene=scene, columns=_ROUTES)
-                there = self._release.table("objects", scene=scene, columns=_OBJECTS).to_pylist()
-                objects = {row["object_id"]: row for row in there}
-                landmarks = self._release.table("landmarks", scene=scene, columns=["landmark_id", "name"]).to_pylist()
-                marks = {row["landmark_id"]: row["name"] for row in landmarks}
-                targets = [objects.get(k, {}) for k in routes["target_object_id"].to_pylist()]
-                for key in ("name", "category", "description", "direction"):
-                    words = pa.array([target.get(key) or "" for target in targets], pa.string())
+                objects = self._release.table("objects", scene=scene, columns=_OBJECTS)
+                landmarks = self._release.table("landmarks", scene=scene, columns=["landmark_id", "name"])
+                at = _rows_of(objects["landmark_id"], landmarks["landmark_id"])
+                objects = objects.append_column("landmark", landmarks["name"].take(at))
+                at = _rows_of(routes["target_object_id"], objects["object_id"])
+                for key in _SHOWN:
+                    words = pc.fill_null(objects[key].cast(pa.string()).take(at), "")
                     routes = routes.append_column(key, words.dictionary_encode())
-                where = pa.array([marks.get(target.get("landmark_id"), "") for target in targets], pa.string())
-                self._read[scene] = routes.append_column("landmark", where.dictionary_encode())
+                self._read[scene] = routes
             return self._read[scene]
 
     def find(
@@ -61,6 +61,11 @@ class TaskList:
         rank = pc.sort_indices(sort, [("key", "descending" if descending else "ascending"), ("id", "ascending")])
         rows = found.take(rank.slice(offset, most)).to_pylist()
         return {"total": found.num_rows, "tasks": [_to_json(row) for row in rows]}
+
+
+def _rows_of(values: pa.ChunkedArray, keys: pa.ChunkedArray) -> pa.ChunkedArray:
+    """Return the row of each value among keys; null where it is none of them."""
+    return pc.index_in(values, value_set=keys.combine_chunks())
 
 
 def _filter(table: pa.Table, setting: str, split: str, words: Sequence[str]) -> pa.Table:

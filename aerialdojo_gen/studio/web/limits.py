@@ -146,9 +146,3 @@ class BoundedLog(logging.Filter):
             return False
         self._passed += 1
         return True
-
-
-def bound_log() -> None:
-    """Limit the log of the server and the event loop."""
-    for name in ("uvicorn.error", "asyncio"):
-        logging.getLogger(name).addFilter(BoundedLog())
