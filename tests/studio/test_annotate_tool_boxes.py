@@ -6,7 +6,6 @@ import http.client
 import json
 import os
 import shutil
-import signal
 import tempfile
 import threading
 import urllib.request
@@ -16,9 +15,9 @@ import numpy as np
 import pytest
 import trimesh
 from starlette.testclient import TestClient
-from support import annotating
 from support.browser import until
 from support.hills import CELL_M, Hills
+from support.pages import Place, serving
 
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.dataset.build import open_pipeline, run_pipeline
@@ -168,9 +167,9 @@ def test_a_server_that_is_killed_leaves_a_recipe_that_is_whole(terrain, project,
         f'annotations = "{annotations}"\n[annotate-import]\npaper_counts = false\n'
     )
     materials, before = assets / "materials.toml", recipe.read_bytes()
-    place = annotating.Place("Scan", pipeline, data, annotations / "Scan.json")
-    with annotating.served(project, place) as (url, process):
-        asking = threading.Thread(target=ask_for_the_shed, args=(url,))
+    place = Place("Scan", pipeline, data, annotations / "Scan.json")
+    with serving(*place.command) as page:
+        asking = threading.Thread(target=ask_for_the_shed, args=(page.url,))
         shard = data / "scenes" / "Scan" / "part-00000.parquet"
         was = shard.stat().st_ino
         if moment == "in the build":
@@ -183,7 +182,7 @@ def test_a_server_that_is_killed_leaves_a_recipe_that_is_whole(terrain, project,
         else:
             while shard.stat().st_ino == was:  # the new scene is not in the store
                 assert asking.is_alive()
-        os.kill(process.pid, signal.SIGKILL)
+        page.process.kill()
         asking.join()
     if moment == "in the build":
         (tmp_path / "kept.toml").replace(materials)

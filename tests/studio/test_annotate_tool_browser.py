@@ -4,8 +4,6 @@ import contextlib
 import http.client
 import itertools
 import json
-import os
-import signal
 import socket
 import threading
 import time
@@ -13,10 +11,10 @@ import urllib.request
 
 import pyarrow.compute as pc
 import pytest
-from support import annotating, foreign
 from support import browser as chrome
-from support.annotate_page import Page, entries
+from support import foreign
 from support.browser import until
+from support.pages import NAMELESS, YARD, Page, Place, entries, serving, yard_in
 
 from aerialdojo_gen.dataset.build import run_pipeline
 from aerialdojo_gen.imports.command import add_scene
@@ -25,11 +23,6 @@ from aerialdojo_gen.store import shards as store
 
 NAME = "Village"
 WORDS = ("one", "two", "three")
-UNLABELLED = """
-  const named = (e) => e.labels?.length || e.getAttribute("aria-label") || e.textContent.trim();
-  return [...document.querySelectorAll("input, select, textarea, button, progress, [role=application]")]
-    .filter((e) => !named(e)).map((e) => e.outerHTML);
-"""
 # Of axe's rules: listitem, aria-allowed-role, and what may stand in a label.
 MISPLACED = """
   const wrong = [];
@@ -46,7 +39,7 @@ WATCH = """
   const status = document.getElementById("saved");
   const unsaved = () => JSON.parse(sessionStorage.getItem("aerialdojo-annotate-queue-" + arguments0) ?? "[]").length;
   new MutationObserver(() => window.said.push([status.textContent, unsaved()])).observe(status, { childList: true });
-""".replace("arguments0", json.dumps(annotating.YARD))
+""".replace("arguments0", json.dumps(YARD))
 TICKS = """
   const later = window.setTimeout;
   window.ticks = 0;
@@ -67,12 +60,12 @@ def roof(house):
 def test_a_foreign_mesh_is_annotated_in_the_browser_and_becomes_tasks(browser, project, tmp_path):
     foreign.village().export(tmp_path / "village.glb")
     scene = add_scene(NAME, tmp_path / "village.glb", tmp_path / "mine", MeshOptions())
-    place = annotating.Place(NAME, scene.pipeline, tmp_path / "data", scene.annotations)
+    place = Place(NAME, scene.pipeline, tmp_path / "data", scene.annotations)
     mark = scene.scene["clock_tower_0000"]
     targets = [scene.scene[f"house_{k:04d}"] for k in (2, 3, 4)]  # each alone in its direction
     bounds = scene.scene.bounds.tolist()
-    with annotating.served(project, place) as (url, _):
-        page = Page(browser, url)
+    with serving(*place.command) as served:
+        page = Page(browser, served.url)
         page.one("#who").send_keys("Ada")
         assert page.text("#objects .empty").startswith("none yet")
         # A landmark: pick, L, a name.
@@ -105,7 +98,7 @@ def test_a_foreign_mesh_is_annotated_in_the_browser_and_becomes_tasks(browser, p
             page.saved()
             page.leave()
         assert page.text("#progress-text") == "3 of 3 objects done"
-        assert browser.execute_script(UNLABELLED) == []
+        assert browser.execute_script(NAMELESS) == []
         written = scene.annotations.read_text()
         # Reload: it is all there.
         browser.refresh()
@@ -146,24 +139,22 @@ def test_a_foreign_mesh_is_annotated_in_the_browser_and_becomes_tasks(browser, p
 class Yard:
     """The yard's annotations, and its server, always on one port, which may die and be started again."""
 
-    def __init__(self, project, place):
-        self._project, self.annotations, self._place = project, place.annotations, place
+    def __init__(self, place):
+        self.annotations, self._place = place.annotations, place
         with socket.socket() as free:
             free.bind(("127.0.0.1", 0))
             self.port = free.getsockname()[1]
-        self._running = contextlib.ExitStack()
-        self._process = None
+        self._running, self._served = contextlib.ExitStack(), None
 
     def start(self):
-        if self._process is None:
-            served = annotating.served(self._project, self._place, self.port)
-            self.url, self._process = self._running.enter_context(served)
+        if self._served is None:
+            self._served = self._running.enter_context(serving(*self._place.command, "--port", self.port))
+            self.url = self._served.url
 
     def kill(self):
-        os.kill(self._process.pid, signal.SIGKILL)
-        self._process.wait()
-        self._process = None
-        self._running.close()
+        self._served.process.kill()
+        self.close()
+        self._served = None
 
     def close(self):
         self._running.close()
@@ -171,8 +162,7 @@ class Yard:
 
 @pytest.fixture(scope="module")
 def yard(project, tmp_path_factory):
-    yard = Yard(project, annotating.yard_in(project, tmp_path_factory.mktemp("yard")))
-    with contextlib.closing(yard):
+    with contextlib.closing(Yard(yard_in(project, tmp_path_factory.mktemp("yard")))) as yard:
         yield yard
 
 

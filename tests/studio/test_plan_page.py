@@ -2,15 +2,13 @@
 
 import json
 import os
-import re
-import subprocess
-import sys
 import urllib.request
 
 import pytest
 from selenium.webdriver import ActionChains
 from support.browser import errors, until
 from support.command_line import called
+from support.pages import serving
 
 PLAN = """\
 plan = 1
@@ -27,17 +25,12 @@ place = [["bench", 0, 0, 90], ["tractor", 8, 8]]
 
 
 @pytest.fixture(scope="module")
-def watched(project, tmp_path_factory):
+def watched(tmp_path_factory):
     """The command's address, and the plan that it watches."""
     plan = tmp_path_factory.mktemp("watched") / "U_Yard_0.toml"
     plan.write_text(PLAN)
-    command = [sys.executable, "-m", "aerialdojo_gen.cli", "build-scenes", "--watch", str(plan), "--no-browser"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=project) as process:
-        try:
-            line = process.stdout.readline()
-            yield re.search(r"http://127\.0\.0\.1:\d+/", line)[0], plan
-        finally:
-            process.kill()
+    with serving("build-scenes", "--watch", plan) as page:
+        yield page.url, plan
 
 
 def read(url):

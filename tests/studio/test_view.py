@@ -5,8 +5,6 @@ import re
 import signal
 import socket
 import struct
-import subprocess
-import sys
 from collections import Counter
 from pathlib import Path
 from urllib.parse import urlsplit
@@ -19,8 +17,8 @@ from fastapi import Response
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from starlette.testclient import TestClient
+from support.pages import YARD, serving
 from support.rendered import MATERIALS, block
-from support.viewing import YARD
 
 from aerialdojo_gen.base.errors import StoreError, UsageError
 from aerialdojo_gen.base.pictures import decode_rgb
@@ -29,8 +27,8 @@ from aerialdojo_gen.dataset.release import open_release
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.studio.view.scenes import route_detail, route_points, scene_index
 from aerialdojo_gen.studio.view.server import view_app
-from aerialdojo_gen.studio.web import serving
 from aerialdojo_gen.studio.web.payload import scene_payload
+from aerialdojo_gen.studio.web.serving import local_app, open_socket
 
 SCENE = f"/scenes/{YARD}/"
 
@@ -142,7 +140,7 @@ def test_every_answer_has_the_security_headers(client):
 
 
 def test_large_bodies_are_refused_before_they_are_read():
-    app = serving.local_app("view.html", "x", max_body_bytes=1000)
+    app = local_app("view.html", "x", max_body_bytes=1000)
 
     @app.post("/api/size")
     def size() -> Response:
@@ -305,7 +303,7 @@ def test_a_taken_port_is_named():
         other.listen()
         port = other.getsockname()[1]
         with pytest.raises(UsageError, match=f"port {port}: Address already in use; leave --port out"):
-            serving.open_socket(port)
+            open_socket(port)
 
 
 def test_the_server_listens_on_the_loopback_alone(view_url):
@@ -317,18 +315,14 @@ def test_the_server_listens_on_the_loopback_alone(view_url):
 
 @pytest.mark.kill
 def test_an_ignored_ctrl_c_stays_ignored_and_a_termination_is_a_plain_end(smoke):
-    command = [sys.executable, "-m", "aerialdojo_gen.cli", "view", "--scene", YARD, "--data", str(smoke),
-               "--no-browser"]  # fmt: skip
-    process = subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_IGN),
-    )  # fmt: skip
-    url = re.fullmatch(rf"{YARD}: (http://127\.0\.0\.1:\d+{SCENE})  \(Ctrl-C .*\)\n", process.stdout.readline())
-    with urlopen(url[1], timeout=60) as answer:
-        assert answer.status == 200
-    # Its handlers are there once it answers.
-    ignored = re.search(r"SigIgn:\s*([0-9a-f]+)", Path(f"/proc/{process.pid}/status").read_text())[1]
-    assert int(ignored, 16) >> (signal.SIGINT - 1) & 1
-    process.send_signal(signal.SIGTERM)
-    _, err = process.communicate(timeout=60)
-    assert (process.returncode, err) == (-signal.SIGTERM, "")
+    asked = ("view", "--scene", YARD, "--data", smoke)
+    with serving(*asked, preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_IGN)) as page:
+        assert re.fullmatch(rf"{YARD}: http://127\.0\.0\.1:\d+{SCENE}  \(Ctrl-C .*\)\n", page.line)
+        with urlopen(page.url, timeout=60) as answer:
+            assert answer.status == 200
+        # Its handlers are there once it answers.
+        ignored = re.search(r"SigIgn:\s*([0-9a-f]+)", Path(f"/proc/{page.process.pid}/status").read_text())[1]
+        assert int(ignored, 16) >> (signal.SIGINT - 1) & 1
+        page.process.send_signal(signal.SIGTERM)
+        assert page.process.wait(60) == -signal.SIGTERM
+        assert page.process.stderr.read() == ""

@@ -9,7 +9,7 @@ import pytest
 from selenium.webdriver import ActionChains
 from selenium.webdriver.common.keys import Keys
 from support.browser import errors, until
-from support.viewing import YARD, draw, ready, texts
+from support.pages import YARD, draw, ready, texts
 
 from aerialdojo_gen.base.pictures import decode_rgb
 from aerialdojo_gen.dataset.release import open_release

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from selenium.webdriver import ActionChains
 from support.browser import errors, until
-from support.viewing import YARD, draw, ready, texts
+from support.pages import NAMELESS, YARD, draw, ready, texts
 
 from aerialdojo_gen.dataset.lookup import ReleasedScene
 from aerialdojo_gen.rendering.gallery import look_at
@@ -247,8 +247,4 @@ def test_keys(yard):
 
 
 def test_every_control_has_a_name(yard):
-    nameless = yard.execute_script(
-        "return [...document.querySelectorAll('input, select, button')].filter((e) =>"
-        " !(e.labels?.length || e.textContent.trim() || e.getAttribute('aria-label'))).map((e) => e.outerHTML)"
-    )
-    assert nameless == []
+    assert yard.execute_script(NAMELESS) == []
