@@ -9,8 +9,21 @@ import traceback
 import cv2
 import numpy as np
 import pytest
-from support.llm_agents import FORWARD_3, KEY, agent_of, begun, goal_for, observation
-from support.llm_server import MOVE, Call, Filtered, Raw, Say, Status, serving
+from support.llm_server import (
+    FORWARD_3,
+    KEY,
+    MOVE,
+    Call,
+    Filtered,
+    Raw,
+    Say,
+    Status,
+    agent_of,
+    begun,
+    goal_for,
+    observation,
+    serving,
+)
 
 from aerialdojo_gen.base.errors import AerialDojoError, MissingPackage, UsageError
 from aerialdojo_gen.benchmark.agents import AgentUnavailable, InvalidAnswer, load_agent

@@ -4,8 +4,24 @@ import email.utils
 import traceback
 
 import pytest
-from support.llm_agents import FORWARD_3, KEY, PROTOCOLS, agent_of, begun, observation
-from support.llm_server import MOVE, Cut, Drip, Endless, Hang, Raw, Say, Status, Trickle, serving
+from support.llm_server import (
+    FORWARD_3,
+    KEY,
+    MOVE,
+    PROTOCOLS,
+    Cut,
+    Drip,
+    Endless,
+    Hang,
+    Raw,
+    Say,
+    Status,
+    Trickle,
+    agent_of,
+    begun,
+    observation,
+    serving,
+)
 
 from aerialdojo_gen.base.errors import AerialDojoError
 from aerialdojo_gen.base.llm_client import service as services

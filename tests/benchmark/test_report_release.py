@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 import pyarrow.parquet as pq
 import pytest
-from support.extended import set_difficulty
+from support.planting import set_difficulty
 from typer.testing import CliRunner
 
 from aerialdojo_gen.benchmark.episodes import read_run

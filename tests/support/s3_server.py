@@ -1,4 +1,4 @@
-"""A real S3 server on loopback, and a proxy before it that answers with faults."""
+"""A real S3 server on loopback, a proxy before it that answers with faults, and files in data roots."""
 
 from __future__ import annotations
 
@@ -7,11 +7,8 @@ import functools
 import re
 import shutil
 import socket
-import subprocess
-import sys
 import threading
 import time
-import urllib.request
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
@@ -34,24 +31,13 @@ def forget_clients() -> None:
 
 @contextlib.contextmanager
 def s3_server() -> Iterator[str]:
-    """Run moto's server in a process of its own; yields its URL."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
-    program = [sys.executable, "-m", "moto.server", "-H", "127.0.0.1", "-p", str(port)]
-    server = subprocess.Popen(program, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    url = f"http://127.0.0.1:{port}"
-    try:
-        for _ in range(600):
-            with contextlib.suppress(OSError):
-                urllib.request.urlopen(url, timeout=1).close()
-                break
-            assert server.poll() is None, "moto's server ended"
-            time.sleep(0.05)
-        yield url
-    finally:
-        server.kill()
-        server.wait()
+    """Run moto's server in threads of this process; yields its URL."""
+    from moto.server import ThreadedMotoServer
+
+    server = ThreadedMotoServer("127.0.0.1", 0, verbose=False)
+    server.start()
+    yield "http://{}:{}".format(*server.get_host_and_port())
+    server.stop()
 
 
 def upload(root: DataRoot, data: Path, folders: Iterable[str]) -> None:
@@ -168,3 +154,20 @@ def _exactly(client: socket.socket, length: int) -> bytes:
             break
         body += block
     return body
+
+
+def write(root: DataRoot, name: str, data: bytes) -> None:
+    with root.commit(name) as path:
+        path.write_bytes(data)
+
+
+def fill(root: DataRoot, folder: str, files: dict[str, bytes]) -> None:
+    with root.commit_folder(folder) as path:
+        for name, data in files.items():
+            (path / name).parent.mkdir(exist_ok=True)
+            (path / name).write_bytes(data)
+
+
+def read_folder(root: DataRoot, folder: str) -> dict[str, bytes]:
+    here = root.local_copy(folder)
+    return {p.relative_to(here).as_posix(): p.read_bytes() for p in here.rglob("*") if p.is_file()}
