@@ -57,6 +57,9 @@ def test_pipelines_that_are_shipped_go_by_name_anywhere(call, tmp_path, monkeypa
     assert call("config", "init", "smoke.toml", "--from", "smoke")[0] == 0
     (tmp_path / "smoke.toml").write_text("seed = 77\n")
     assert "seed = 77" in call("config", "show", "--pipeline", "smoke.toml")[1], "what lies here goes before"
+    (tmp_path / "smoke.toml").write_text("recipes = 'nowhere'\n")
+    said = f"error: no folder {tmp_path / 'nowhere'}: set recipes in the pipeline file\n"
+    assert call("run", "smoke.toml")[2] == said
     for wanted in ("smok", "nowhere/smoke.toml", "pipelines/smoke.toml"):
         code, _, said = call("run", wanted)
         assert code == 2

@@ -46,41 +46,33 @@ def unpacked(payload):
     for group in header["groups"]:
         position = array(group["position"], "<f4").reshape(-1, 3)
         index = array(group["index"], "<u4").reshape(-1, 3)
-        look = array(group["colour"], np.uint8).reshape(-1, 4)[:, :3] if "colour" in group else None
-        if look is None:
+        ranges = array(group["ranges"], "<u4").reshape(-1, 3)
+        assert [*ranges[:, 1], len(index)] == [0, *np.cumsum(ranges[:, 2])]
+        if "colour" in group:
+            looks = map(tuple, array(group["colour"], np.uint8).reshape(-1, 4)[index[:, 0], :3])
+        else:
             uvl = array(group["uv"], "<f4").reshape(-1, 3)
-            layers = [cv2.imdecode(array(v, np.uint8), cv2.IMREAD_COLOR)[..., ::-1] for v in group["layers"]]
-        covered = 0
-        for node, first, count in array(group["ranges"], "<u4").reshape(-1, 3):
-            assert first == covered
-            covered += count
-            for corners in index[first : first + count]:
-                if look is not None:
-                    key = tuple(look[corners[0]])
-                else:
-                    key = (layers[int(uvl[corners[0], 2])].tobytes(), tuple(map(tuple, uvl[corners, :2])))
-                triangles.setdefault(header["nodes"][node]["node"], []).append(
-                    (key, tuple(position[corners].ravel()))
-                )
-        assert covered == len(index)
-    return header, {node: Counter(found) for node, found in triangles.items()}
+            layers = [
+                cv2.imdecode(array(v, np.uint8), cv2.IMREAD_COLOR)[..., ::-1].tobytes() for v in group["layers"]
+            ]
+            looks = ((layers[int(uvl[c[0], 2])], tuple(map(tuple, uvl[c, :2]))) for c in index)
+        for node, look, corners in zip(np.repeat(ranges[:, 0], ranges[:, 2]), looks, position[index], strict=True):
+            triangles.setdefault(header["nodes"][node]["node"], Counter())[look, tuple(corners.ravel())] += 1
+    return header, triangles
 
 
 def expected(scene):
     found = {}
-    for item in scene.instances:
-        rows = found.setdefault(item.node, [])
-        for part in item.parts:
-            material = scene.materials[part.material]
-            for face in part.faces:
+    for item, part in ((one, part) for one in scene.instances for part in one.parts):
+        material = scene.materials[part.material]
+        for face in part.faces:
+            look = tuple(material.colour)
+            if material.texture is not None:
                 uv = part.uv[face].astype(np.float32) * np.float32([1, -1])
-                key = (
-                    tuple(material.colour)
-                    if material.texture is None
-                    else (material.texture.tobytes(), tuple(map(tuple, uv)))
-                )
-                rows.append((key, tuple(part.vertices[face].astype(np.float32).ravel())))
-    return {node: Counter(rows) for node, rows in found.items()}
+                look = (material.texture.tobytes(), tuple(map(tuple, uv)))
+            corners = tuple(part.vertices[face].astype(np.float32).ravel())
+            found.setdefault(item.node, Counter())[look, corners] += 1
+    return found
 
 
 corner = st.tuples(*[st.floats(-50, 50, width=32).map(float)] * 3)
