@@ -206,18 +206,14 @@ def _sensors(
 
     own = getattr(load_agent(agent, **options), "sensors", None)
     sensors = own if isinstance(own, Sensors) else Sensors()
-    return replace(
-        sensors,
-        views=sensors.views if view is None else tuple(view),
-        width=width or sensors.width,
-        height=height or sensors.height,
-    )
+    views = sensors.views if view is None else tuple(view)
+    return replace(sensors, views=views, width=width or sensors.width, height=height or sensors.height)
 
 
 def rerun_command(more: Sequence[str], *, without: Sequence[str] = (), data: str | None = None) -> str:
     """Return this process's command with all its options, quoted for a shell."""
     kept = [argument for argument in sys.argv[1:] if argument not in without]
-    named = any(argument == "--data" or argument.startswith("--data=") for argument in kept)
+    named = any(argument.partition("=")[0] == "--data" for argument in kept)
     if data is not None and os.environ.get("AERIALDOJO_DATA") and not named:
         kept += ["--data", data]
     kept += [argument for argument in more if argument not in kept]

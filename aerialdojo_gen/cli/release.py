@@ -147,9 +147,10 @@ def view(
     from aerialdojo_gen.studio.web.serving import open_socket, require_web, serve, url_of
 
     require_web()
-    from aerialdojo_gen.studio.view.server import chosen_scenes, view_app
+    from aerialdojo_gen.dataset.contents import scenes_in_release
+    from aerialdojo_gen.studio.view.server import view_app
 
-    names = chosen_scenes(data, merge_scenes(scenes, scene))
+    names = scenes_in_release(data, merge_scenes(scenes, scene))
     page = view_app(data, names)
     listener = open_socket(port)
     # One scene is shown at once; of several the start page lets one choose.

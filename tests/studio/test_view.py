@@ -275,15 +275,15 @@ def test_what_is_not_there_is_named_or_refused(smoke, client, release, tmp_path)
         answer = client.get(path)
         assert (answer.status_code, why in answer.json()["error"]) == (status, True), answer.text
     # Of several scenes those alone that are shown.
-    one = TestClient(view_app(smoke, YARD), base_url="http://127.0.0.1")
+    one = TestClient(view_app(smoke, [YARD]), base_url="http://127.0.0.1")
     assert [scene["scene"] for scene in one.get("/api/release").json()["scenes"]] == [YARD]
     assert {task["scene"] for task in asked(one, most=200)["tasks"]} == {YARD}
     other = next(name for name in release.scenes if name != YARD)
     assert one.get(f"/scenes/{other}/api/index").status_code == 404
     with pytest.raises(UsageError, match="did you mean 'U_Courtyard_0'"):
-        view_app(smoke, "U_Courtyard0")
+        view_app(smoke, ["U_Courtyard0"])
     with pytest.raises(StoreError, match="there is no release in"):
-        view_app(tmp_path, YARD)
+        view_app(tmp_path, [YARD])
 
 
 # ---- the command ----

@@ -91,20 +91,17 @@ class Session(AgentBase):
 
     def picture(self, view: str) -> NDArray[np.uint8]:
         """Return what a camera shows, (H, W, 3) uint8, or the goal's picture; UsageError if there is none."""
-        if view == "goal":
-            image = None if self._goal is None else self._goal.image
-        else:
-            image = None if self._observation is None else self._observation.rgb.get(view)
+        shown = {} if self._observation is None else self._observation.rgb
+        image = self._goal.image if self._goal is not None and view == "goal" else shown.get(view)
         if image is None:
             raise UsageError(f"there is no picture {view[:20]!r}")
         return image
 
     def depth_m(self, view: str) -> NDArray[np.float32]:
         """Return a camera's depth, (H, W) float32 metres, 0 where nothing is in range; UsageError without one."""
-        depth = None if self._observation is None else self._observation.depth_m.get(view)
-        if depth is None:
+        if self._observation is None or view not in self._observation.depth_m:
             raise UsageError(f"there is no depth of {view[:20]!r}")
-        return depth
+        return self._observation.depth_m[view]
 
     def counts(self) -> tuple[int, int]:
         """Return the numbers of tasks flown and of successes, in the tables."""
@@ -152,11 +149,8 @@ class Session(AgentBase):
             pass
         except Exception as error:
             self.error = error
-            known = isinstance(error, AerialDojoError)
-            self._show(
-                "failed",
-                error=str(error) if known else "an unexpected error: end the command, and the terminal shows it",
-            )
+            defect = "an unexpected error: end the command, and the terminal shows it"
+            self._show("failed", error=str(error) if isinstance(error, AerialDojoError) else defect)
         finally:
             self._flight.close()
             release_context()
@@ -164,9 +158,7 @@ class Session(AgentBase):
     def _fly_all(self) -> None:
         # A task that the renderer failed at is offered again, unlike one that was flown.
         left = pa.concat_tables([self._run.todo(False), self._run.todo(True)])
-        left = left.take(
-            _spread(left["scene"].to_pylist(), left["task_id"].to_pylist(), self._evaluation.selection.seed)
-        )
+        left = left.take(_spread(left, self._evaluation.selection.seed))
         # One attempt: a second one would begin in the middle of the person's flight.
         worker = Worker(self, self._flight, self._data, self._evaluation.identity(), RetryPolicy(1), Secrets())
         scenes = [*left["scene"].to_pylist(), ""]
@@ -217,8 +209,9 @@ class Session(AgentBase):
 _BUTTONS = {("consent", "agree"), ("ended", "next")}
 
 
-def _spread(scenes: list[str], task_ids: list[str], seed: int) -> pa.Array:
+def _spread(tasks: pa.Table, seed: int) -> pa.Array:
     """Order tasks so that whenever the person ends, all scenes have as many flights: one of each, then a second."""
+    scenes, task_ids = tasks["scene"].to_pylist(), tasks["task_id"].to_pylist()
     turns, keys = Counter[str](), []
     for i in sorted(range(len(task_ids)), key=lambda i: rng.rank(seed, "fly", task_ids[i])):
         keys.append((turns[scenes[i]], rng.rank(seed, "fly", scenes[i]), i))

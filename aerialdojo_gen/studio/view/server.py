@@ -19,10 +19,10 @@ from aerialdojo_gen.studio.web.serving import STATIC, local_app
 _MAX_TASKS = 200
 
 
-def view_app(data: Where, scenes: str | Sequence[str] | None = None) -> FastAPI:
-    """Make the app of a release: a start page at ``/``, one page per scene at ``/scenes/NAME/``."""
+def view_app(data: Where, scenes: Sequence[str] = ()) -> FastAPI:
+    """Make the app of a release's scenes, by names and globs: a start page at ``/``, each at ``/scenes/NAME/``."""
     root = open_root(data)
-    names = chosen_scenes(root, scenes)
+    names = scenes_in_release(root, scenes)
     app = local_app("start.html", f"aerialdojo-gen view {root}", also=("view.html",))
     cache, release = SceneCache(root, names), open_release(root)
     tasks = TaskList(release, names)
@@ -87,12 +87,6 @@ def view_app(data: Where, scenes: str | Sequence[str] | None = None) -> FastAPI:
         return Response(cache.thumb(name, object_id), media_type="image/jpeg")
 
     return app
-
-
-def chosen_scenes(data: Where, scenes: str | Sequence[str] | None) -> list[str]:
-    """Resolve names and globs to scenes of the release; all by default."""
-    given = (scenes,) if isinstance(scenes, str) else tuple(scenes or ())
-    return scenes_in_release(data, given)
 
 
 def _counts(root: Where, name: str) -> dict[str, int]:
