@@ -128,17 +128,12 @@ def _run() -> tuple[int, str]:
     except _BadOption as error:
         where = f"; see {error.ctx.command_path} --help" if error.ctx else ""
         return error.exit_code, f"{error.format_message().rstrip('.')}{where}"
-    except AerialDojoError as error:
-        return error.exit_code, _with_notes(str(error), error)
     except Exception as error:
-        message = environment_errors.environment_error(error)
+        ours = isinstance(error, AerialDojoError)
+        message = str(error) if ours else environment_errors.environment_error(error)
         if message is None:
             raise
-        return 1, _with_notes(message, error)
-
-
-def _with_notes(message: str, error: Exception) -> str:
-    return "\n".join([message, *getattr(error, "__notes__", ())])
+        return getattr(error, "exit_code", 1), "\n".join([message, *getattr(error, "__notes__", ())])
 
 
 if __name__ == "__main__":

@@ -12,10 +12,12 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
 
+from aerialdojo_gen.base import cli_context
 from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.base.secrets import Secrets
 from aerialdojo_gen.cli import options
@@ -121,7 +123,8 @@ def stage_command(app: typer.Typer, stage: str) -> Callable[[Callable[..., None]
             values = {one.name: given.pop(one.name) for one in own}
             function(StageOptions(**given), **values)
 
-        command.__signature__ = inspect.Signature([*common[:-2], *own, *common[-2:]])  # type: ignore[attr-defined]
+        # What Typer reads the options from.
+        vars(command)["__signature__"] = inspect.Signature([*common[:-2], *own, *common[-2:]])
         app.command(stage, help=BY_NAME[stage].help)(command)
 
     return register
@@ -151,6 +154,13 @@ def run_chosen(
         if not isinstance(error, UsageError):
             error.add_note(kept)
         raise
+
+
+def print_next(scene: str | None, pipeline: Path, project: Path) -> None:
+    """Say the commands that make tasks in scenes that were added; of one without annotations, first their draft."""
+    if scene is not None:
+        print(f"next: {cli_context.command('annotate-draft', scene, pipeline=pipeline)}")
+    print(f"then: {cli_context.command('run', pipeline, data=project / 'data')}")
 
 
 def print_scene(scene: Scene, notes: Sequence[str]) -> None:

@@ -27,7 +27,23 @@ def complete_pipelines(incomplete: str) -> list[str]:
 
 def complete_scenes(ctx: typer.Context, incomplete: str) -> list[str]:
     """Offer the scenes of the pipeline that is named, else of the release in the data directory, else all recipes."""
-    return [name for name in _scenes(ctx) if name.startswith(incomplete)]
+    from aerialdojo_gen.base.errors import AerialDojoError
+
+    known: list[str] = []
+    # A tab is no place for an error's line.
+    with contextlib.suppress(AerialDojoError, OSError):
+        pipeline, data = ctx.params.get("pipeline"), str(ctx.params.get("data") or "data")
+        if pipeline:
+            from aerialdojo_gen.dataset.build import open_pipeline
+            from aerialdojo_gen.pipeline.runner import known_scenes
+
+            known = known_scenes(open_pipeline(pipeline, "data")[1].recipes)
+        elif "://" not in data and Path(data).is_dir():
+            from aerialdojo_gen.dataset.contents import existing_scenes
+
+            known = [*existing_scenes(open_root(data))]
+    known = known or sorted(file.stem for file in (home() / "scene_assets" / "scenes").glob("*.toml"))
+    return [name for name in known if name.startswith(incomplete)]
 
 
 def complete_agents(incomplete: str) -> list[str]:
@@ -35,28 +51,6 @@ def complete_agents(incomplete: str) -> list[str]:
     from aerialdojo_gen.benchmark.agents.load import BUILT_IN
 
     return [name for name in BUILT_IN if name.startswith(incomplete)]
-
-
-def _scenes(ctx: typer.Context) -> list[str]:
-    from aerialdojo_gen.base.errors import AerialDojoError
-
-    # A tab is no place for an error's line.
-    with contextlib.suppress(AerialDojoError, OSError):
-        pipeline, data = ctx.params.get("pipeline"), str(ctx.params.get("data") or "")
-        if pipeline:
-            from aerialdojo_gen.dataset.build import open_pipeline
-            from aerialdojo_gen.pipeline.runner import known_scenes
-
-            return known_scenes(open_pipeline(pipeline, "data")[1].recipes)
-        if "://" not in data and (released := _released(Path(data or "data"))):
-            return released
-    return sorted(file.stem for file in (home() / "scene_assets" / "scenes").glob("*.toml"))
-
-
-def _released(data: Path) -> list[str]:
-    from aerialdojo_gen.dataset.contents import existing_scenes
-
-    return list(existing_scenes(open_root(data))) if data.is_dir() else []
 
 
 def _files(incomplete: str) -> Iterator[str]:

@@ -14,7 +14,7 @@ from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.base.names import choose_scenes, closest
 from aerialdojo_gen.base.text_table import terminal_width
 from aerialdojo_gen.cli import options
-from aerialdojo_gen.cli.common import key_values, merge_scenes, print_scene
+from aerialdojo_gen.cli.common import key_values, merge_scenes, print_next, print_scene
 from aerialdojo_gen.dataset.build import open_pipeline, pipeline_file
 from aerialdojo_gen.store.atomic import make_folder
 from aerialdojo_gen.store.root import open_root
@@ -92,10 +92,8 @@ def add_scene(
     else:
         made = [command.add_scene(name, mesh, project, options, annotations=annotations, force=force)]
         _describe(made[0])
-    first = next((added for added in made if not added.annotations.exists()), None)
-    if first is not None:
-        print(f"next: {cli_context.command('annotate-draft', first.scene.name, pipeline=first.pipeline)}")
-    print(f"then: {cli_context.command('run', made[0].pipeline, data=project / 'data')}")
+    first = next((added.scene.name for added in made if not added.annotations.exists()), None)
+    print_next(first, made[0].pipeline, project)
 
 
 def _describe(added: AddedScene) -> None:

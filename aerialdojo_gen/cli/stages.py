@@ -24,9 +24,7 @@ _WITH_OPTIONS = ("build-scenes", "plan", "split", "render")
 
 
 def _add_command(stage: str) -> None:
-    @stage_command(app, stage)
-    def run_it(common: StageOptions) -> None:
-        common.run_until(stage)
+    stage_command(app, stage)(lambda common: common.run_until(stage))
 
 
 for _stage in STAGES:

@@ -51,7 +51,8 @@ NO_SENSE = [
     "evaluate --run ../run", "train nothing", "train imitation --renderer nothing",
     *(f"render {option} nothing" for option in (
         "--split", "--profile", "--renderer", "--sampling", "--frames", "--shard", "--budget")),
-    "plan --workers 0", "plan --executor nothing", "run nothing", "run mine.toml", "validate --report faults.txt",
+    "plan --workers 0", "plan --executor nothing", "run nothing", "run mine.toml",
+    "build-scenes --watch U_Nil_0.toml", "validate --report faults.txt",
     *(f"report {option} nothing" for option in ("--format", "--group", "--profile", "--table")),
     "export --format nothing",
     *(f"export --format lerobot {option} nothing" for option in ("--split", "--view", "--goal", "--source")),

@@ -9,7 +9,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from support import task_files
-from support.authors_files import document, put
+from support.task_files import authors as document
+from support.task_files import put_authors as put
 
 from aerialdojo_gen.base.errors import ImportRefused
 from aerialdojo_gen.exchange.importing import Options, import_benchmark

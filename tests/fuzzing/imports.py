@@ -14,9 +14,9 @@ from aerialdojo_gen.exchange.importing import Options, import_benchmark
 
 
 def _aerialdojo() -> list[Case]:
-    from support.authors_files import document, put
-
-    return [made(lambda folder, turn=turn: put(folder, *document(turn))) for turn in (15, 60)]
+    return [
+        made(lambda folder, turn=turn: task_files.put_authors(folder, *task_files.authors(turn))) for turn in (15, 60)
+    ]
 
 
 def _written(document: Callable[[Path], object]) -> Callable[[], list[Case]]:

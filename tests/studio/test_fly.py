@@ -129,7 +129,7 @@ def test_what_is_refused_and_how_deep_it_is(smoke, tmp_path):
     assert (missed["termination"], missed["n_refused"], missed["stop_called"]) == ("stop", 1, True)
 
 
-def test_only_the_shown_states_own_answer_counts_and_only_from_this_page(smoke, tmp_path):
+def test_only_the_shown_states_own_answer_counts_of_one_page_one_pilot_and_one_selection(smoke, tmp_path):
     with flying(smoke, tmp_path) as (client, consent):
         assert client.get("/api/pictures/front").status_code == 404
         assert client.post("/api/act", json={"version": consent["version"], "action": 1}).status_code == 409
@@ -146,13 +146,9 @@ def test_only_the_shown_states_own_answer_counts_and_only_from_this_page(smoke, 
         assert client.get("/api/depth/behind/at?x=0&y=0").status_code == 404
         assert client.get("/api/pictures/goal").status_code == 404
         assert client.get("/api/state").json() == state
-
-
-def test_another_selection_or_a_second_pilot_of_a_run_is_refused(smoke, tmp_path):
-    with flying(smoke, tmp_path) as (client, state):
         with pytest.raises(StoreError, match="another run is writing"), flying(smoke, tmp_path):
             pass
-        fly(client, post(client, "agree", state), [0])
+        fly(client, state, [STOP])
     with pytest.raises(UsageError, match="was begun with limit = 2, not 3"):
         flying(smoke, tmp_path, Selection(modalities=("semantic",), limit=3)).__enter__()
     with Session(smoke, evaluation(), tmp_path).running(restart=True):

@@ -7,7 +7,6 @@ import urllib.request
 import pytest
 from selenium.webdriver import ActionChains
 from support.browser import errors, until
-from support.command_line import called
 from support.pages import serving
 
 PLAN = """\
@@ -65,13 +64,6 @@ def test_a_saved_plan_is_built_again_and_a_broken_one_keeps_the_last_scene(watch
     assert read(f"{url}api/scene") != payload
     plan.unlink()
     assert "U_Yard_0.toml" in json.loads(read(f"{url}api/state"))["error"]
-
-
-def test_a_file_that_does_not_exist_is_named(tmp_path):
-    done = called("build-scenes", "--watch", tmp_path / "U_Nil_0.toml")
-    assert done.returncode == 2
-    assert "U_Nil_0.toml" in done.stderr
-    assert "Traceback" not in done.stderr
 
 
 def test_the_page_shows_the_scene_again_with_the_same_camera(browser, watched):

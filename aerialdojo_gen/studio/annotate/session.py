@@ -46,10 +46,7 @@ class AnnotationSession:
         self.storage = Storage(roots.annotations, name)
         self.storage.load()
         self._pipeline, self._roots = pipeline, roots
-        catalogue = load_catalogue(roots.scene_assets)
-        self._names = catalogue.names
-        self._catalogue = catalogue
-        self._targets = catalogue.targets
+        self._catalogue = load_catalogue(roots.scene_assets)
         self._counts = paper_counts().get(name) if pipeline.annotate_import.paper_counts else None
         self._lock = threading.RLock()  # the geometry caches results
         self._open_scene()
@@ -72,9 +69,9 @@ class AnnotationSession:
     def facts(self) -> dict[str, Any]:
         """Return what does not change: name, bounds and categories with their words."""
         there = {instance.category for instance in self.scene.instances}
-        words = {category: self._names.get(category, spoken(category)) for category in there}
+        words = {category: self._catalogue.names.get(category, spoken(category)) for category in there}
         if self.scene.imported:
-            words |= {category: self._names[category] for category in self._targets}
+            words |= {category: self._catalogue.names[category] for category in self._catalogue.targets}
         return {
             "scene": self.scene.name,
             "imported": self.scene.imported,
@@ -86,11 +83,9 @@ class AnnotationSession:
             "wanted": self._counts,
         }
 
-    def document(self, client: str = "") -> dict[str, Any]:
+    def document(self, client: str = "", state: State | None = None) -> dict[str, Any]:
         """Return the annotations with positions, faults, and what the tab `client` can undo."""
-        return self._document(self.storage.load(), client)
-
-    def _document(self, state: State, client: str) -> dict[str, Any]:
+        state = state or self.storage.load()
         with self._lock:
             undo, redo = self._history().stacks(client)
             if self._described is None or self._described[0] != state.version:
@@ -126,7 +121,7 @@ class AnnotationSession:
     def saved(self, done: tuple[State, Record | None], author: Author) -> dict[str, Any]:
         """Return the annotations after a change of the storage."""
         state, record = done
-        return self._document(state, author.client) | {"done": record.model_dump(mode="json") if record else None}
+        return self.document(author.client, state) | {"done": record.model_dump(mode="json") if record else None}
 
     def changes_since(self, version: str) -> list[dict[str, Any]]:
         """Return the changes after a version."""
@@ -159,7 +154,7 @@ class AnnotationSession:
         return {
             "node": node,
             "category": instance.category,
-            "word": self._names.get(instance.category, spoken(instance.category)),
+            "word": self._catalogue.names.get(instance.category, spoken(instance.category)),
             "attributes": instance.attributes,
             "boxed": imported is not None and node in {cut.node for cut in imported.cuts},
             "size_m": np.ptp(instance.bounds, axis=0).round(2).tolist(),
