@@ -187,10 +187,10 @@ def _agent(agent: str | None, preset: str | None, given: dict[str, str]) -> tupl
         return agent or "random", read_options(agent or "random", given)
     from aerialdojo_gen.benchmark.llm.options import preset as find
 
-    found = find(preset)
-    if agent is not None and agent != found.agent:
-        raise UsageError(f"preset {preset!r} is of the agent {found.agent!r}: leave --agent {agent} out")
-    return found.agent, found.options | read_options(found.agent, given)
+    model = find(preset)
+    if agent is not None and agent != model.agent:
+        raise UsageError(f"preset {preset!r} is of the agent {model.agent!r}: leave --agent {agent} out")
+    return model.agent, model.options | read_options(model.agent, given)
 
 
 def _sensors(

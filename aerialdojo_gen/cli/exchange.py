@@ -150,20 +150,20 @@ def export(
             made = export_for_learning(
                 form, root, target, request, force=force, workers=workers, reporter=Reporter(quiet=quiet)
             )
-        counts, told = made.counts, asdict(made)
+        counts, document = made.counts, asdict(made)
     elif form in SHAPES:
-        counts = told = export_shapes(
+        counts = document = export_shapes(
             form, root, target, chosen, force=force, reporter=Reporter(quiet=quiet or as_json),
             points_per_m2=POINTS_PER_M2 if points_per_m2 is None else points_per_m2,
             voxel_m=VOXEL_M if voxel_m is None else voxel_m,
         )  # fmt: skip
     else:
-        counts = told = export_release(
+        counts = document = export_release(
             form, root, target, chosen, force=force, picture_px=picture_size, shards=shards,
             reporter=Reporter(quiet=quiet or as_json),
         )  # fmt: skip
     if as_json:
-        print_json({"path": str(target), **told})
+        print_json({"path": str(target), **document})
     elif not quiet:
         print(f"{target}: " + ", ".join(f"{n:,} {name}" for name, n in counts.items()))
 

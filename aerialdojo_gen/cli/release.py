@@ -119,13 +119,13 @@ def show(
     from aerialdojo_gen.studio.show.figure import write_page, write_png
     from aerialdojo_gen.studio.show.pictured import picture_task
 
-    found = find_task(data, task_id)
+    record = find_task(data, task_id)
     if as_json:
         # The rows as they stand: nothing is drawn unless a file is asked for.
-        print_json(found.as_json())
+        print_json(record.as_json())
         if out is None and html is None:
             return
-    pictured = picture_task(found, "image" if task_id.endswith("-i") else "semantic", frames)
+    pictured = picture_task(record, "image" if task_id.endswith("-i") else "semantic", frames)
     stream = sys.stderr if as_json else sys.stdout
     if not as_json:
         print("\n".join([pictured.title, pictured.terminal_goal, *facts(pictured.facts, terminal_width())]))

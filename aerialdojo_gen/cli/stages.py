@@ -83,11 +83,11 @@ def status(
     """Say which scenes of each stage are fresh, stale or missing; run and write nothing."""
     from aerialdojo_gen.dataset.status import pipeline_status, status_table
 
-    found = pipeline_status(pipeline, data, scenes=merge_scenes(scenes, scene))
+    states = pipeline_status(pipeline, data, scenes=merge_scenes(scenes, scene))
     if as_json:
-        print_json([asdict(one) for one in found])
+        print_json([asdict(one) for one in states])
     else:
-        print("\n".join(status_table(found).lines(terminal_width())))
+        print("\n".join(status_table(states).lines(terminal_width())))
 
 
 @app.command("run")

@@ -96,16 +96,16 @@ def validate(
         is_of = f"which is --pipeline {' or '.join(names)}: {definitions.name}"
         reporter.line(f"not the pipeline of the release, {is_of}")
     _name_orphans(release, reporter)
-    found = validation.validate(requested, workers=workers, executor=executor, address=address, reporter=reporter)
+    outcome = validation.validate(requested, workers=workers, executor=executor, address=address, reporter=reporter)
     if report is not None:
-        validation.write_report(found.faults, report)
+        validation.write_report(outcome.faults, report)
     if as_json:
-        print_json(found.as_json())
+        print_json(outcome.as_json())
     else:
         if not quiet:
-            print("\n".join(found.table_lines(terminal_width(), verbose=verbose)))
-        print("\n".join([*found.fault_lines(max_faults), found.verdict()]))
-    if found.faults:
+            print("\n".join(outcome.table_lines(terminal_width(), verbose=verbose)))
+        print("\n".join([*outcome.fault_lines(max_faults), outcome.verdict()]))
+    if outcome.faults:
         raise SystemExit(1)
 
 

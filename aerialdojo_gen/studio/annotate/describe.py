@@ -13,7 +13,7 @@ from aerialdojo_gen.annotations.format import Annotations, Object, format_annota
 from aerialdojo_gen.annotations.relations import SceneGeometry
 from aerialdojo_gen.annotations.vocabulary import Vocabulary
 from aerialdojo_gen.imports.forms import is_unnamed
-from aerialdojo_gen.studio.annotate.document import called
+from aerialdojo_gen.studio.annotate.document import describe_entry
 
 _PATH = re.compile(r"^(landmarks|objects)\[(\d+)\](?:\.(\w+))?")
 _MENTION = re.compile(r"\b(landmarks|objects)\[(\d+)\]")
@@ -33,7 +33,9 @@ class Describer:
         general = []
         faulty = check_source(source, self._vocabulary, self._counts, self._geometry).faults
         for fault in faulty:
-            message = _MENTION.sub(lambda m: called(m[1], getattr(annotations, m[1])[int(m[2])]), fault.message)
+            message = _MENTION.sub(
+                lambda m: describe_entry(m[1], getattr(annotations, m[1])[int(m[2])]), fault.message
+            )
             at = _PATH.match(fault.path)
             if at is None:
                 general.append(message)
@@ -64,14 +66,14 @@ class Describer:
 
     def place(self, node: str) -> dict[str, Any]:
         """Middle of a node's box, ``position_m``; None where the scene has no such node."""
-        there = node in self._scene
-        return {"position_m": self._scene[node].centroid.round(3).tolist() if there else None}
+        position_m = self._scene[node].centroid.round(3).tolist() if node in self._scene else None
+        return {"position_m": position_m}
 
     def bearing(self, annotations: Annotations, node: str) -> dict[str, Any]:
         """Nearest ``landmark`` and ``direction`` of a node, as the task will state them; None where there is none."""
         marks = [m for m in sorted(annotations.landmarks, key=lambda m: m.id) if m.node in self._scene]
         places = np.array([self._scene[m.node].centroid for m in marks]).reshape(-1, 3)
-        found = nearest_landmark(self._scene[node].centroid, places) if node in self._scene else None
-        if found is None:
+        nearest = nearest_landmark(self._scene[node].centroid, places) if node in self._scene else None
+        if nearest is None:
             return {"landmark": None, "direction": None}
-        return {"landmark": marks[found.landmark].name, "direction": found.direction}
+        return {"landmark": marks[nearest.landmark].name, "direction": nearest.direction}

@@ -111,10 +111,10 @@ def edits_of(operation: Operation, annotations: Annotations, next_id: int) -> li
         empty = {key: "" for key in model.model_fields if key not in ("id", "anchor")}
         after = _entry(model, empty | {"id": next_id} | operation.fields.set_values())
     else:
-        entry_id, found = operation.id, find(annotations, kind, operation.id)
-        if found is None:
+        entry_id, match = operation.id, find(annotations, kind, operation.id)
+        if match is None:
             raise ConflictError(f"{kind[:-1]} {entry_id} no longer exists")
-        index, before = found
+        index, before = match
         if isinstance(operation, Change):
             after = _entry(model, before.model_dump() | operation.fields.set_values())
     return [] if after == before else [Edit(kind=kind, id=entry_id, index=index, before=before, after=after)]
@@ -157,7 +157,7 @@ def difference(before: Annotations, after: Annotations) -> list[Edit]:
     return edits
 
 
-def called(kind: str, entry: Entry) -> str:
+def describe_entry(kind: str, entry: Entry) -> str:
     """Name an entry for people."""
     return f"{kind[:-1]} {entry.id}" + (f" ({entry.name})" if entry.name else "")
 
@@ -170,7 +170,7 @@ def describe(edits: Sequence[Edit]) -> str:
     for edit in edits[:3]:
         entry = edit.after or edit.before
         assert entry is not None
-        thing = called(edit.kind, entry)
+        thing = describe_entry(edit.kind, entry)
         if edit.before is None:
             words.append(f"added {thing}")
         elif edit.after is None:

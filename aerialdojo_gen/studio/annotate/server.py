@@ -67,19 +67,19 @@ class TokenGate(BaseHTTPMiddleware):
             kept = f"{COOKIE}={self._token}; HttpOnly; SameSite=Strict; Path=/"
             return RedirectResponse("/", 303, {"set-cookie": kept})
         if not self._is_token(cookie):
-            for given in filter(None, (token, cookie)):
-                self._record_failed_login(address, given)
+            for secret in filter(None, (token, cookie)):
+                self._record_failed_login(address, secret)
             return PlainTextResponse("open the address that the command printed; it contains the token", 401)
         if request.headers.get("origin") not in (None, f"http://{request.headers.get('host', '')}"):
             return PlainTextResponse("requests from other sites are not allowed", 403)
         return await call_next(request)
 
-    def _is_token(self, given: str) -> bool:
-        return hmac.compare_digest(given.encode("utf-8", "replace"), self._token.encode())
+    def _is_token(self, secret: str) -> bool:
+        return hmac.compare_digest(secret.encode("utf-8", "replace"), self._token.encode())
 
-    def _record_failed_login(self, address: str, given: str) -> None:
+    def _record_failed_login(self, address: str, secret: str) -> None:
         failed = self._failed_logins.pop(address, None) or _FailedLogins()
-        failed.add(given, time.monotonic())
+        failed.add(secret, time.monotonic())
         self._failed_logins[address] = failed
         while len(self._failed_logins) > _MAX_ADDRESSES:
             self._failed_logins.popitem(last=False)
@@ -92,17 +92,17 @@ class _FailedLogins:
     level: float = 0.0
     since: float = 0.0
     # A tab from before a restart keeps sending its old token: that is no guess.
-    seen: set[str] = field(default_factory=set)
+    digests: set[str] = field(default_factory=set)
 
     def wait(self, now: float) -> float:
         return (self.level - MAX_FAILED_LOGINS + 1) * SECONDS_PER_FAILED_LOGIN - (now - self.since)
 
-    def add(self, given: str, now: float) -> None:
-        digest = hashlib.sha256(given.encode("utf-8", "replace")).hexdigest()
+    def add(self, secret: str, now: float) -> None:
+        digest = hashlib.sha256(secret.encode("utf-8", "replace")).hexdigest()
         left = max(0.0, self.level - (now - self.since) / SECONDS_PER_FAILED_LOGIN)
-        self.seen = self.seen if left > 0.0 else set()
-        self.level, self.since = left + (digest not in self.seen), now
-        self.seen.add(digest)
+        self.digests = self.digests if left > 0.0 else set()
+        self.level, self.since = left + (digest not in self.digests), now
+        self.digests.add(digest)
 
 
 STATIC = Path(__file__).resolve().parent / "static"

@@ -68,8 +68,8 @@ class AnnotationSession:
 
     def facts(self) -> dict[str, Any]:
         """Return what does not change: name, bounds and categories with their words."""
-        there = {instance.category for instance in self.scene.instances}
-        words = {category: self._catalogue.names.get(category, spoken(category)) for category in there}
+        categories = {instance.category for instance in self.scene.instances}
+        words = {category: self._catalogue.names.get(category, spoken(category)) for category in categories}
         if self.scene.imported:
             words |= {category: self._catalogue.names[category] for category in self._catalogue.targets}
         return {
@@ -164,10 +164,10 @@ class AnnotationSession:
 
     def object(self, object_id: int) -> Object:
         """Return an object whose node is in the scene; `UsageError` if there is none."""
-        found = find(self.storage.load().annotations, "objects", object_id)
-        if found is None or not isinstance(found[1], Object) or found[1].node not in self.scene:
+        match = find(self.storage.load().annotations, "objects", object_id)
+        if match is None or not isinstance(match[1], Object) or match[1].node not in self.scene:
             raise UsageError(f"there is no object {object_id} with a node in the scene")
-        return found[1]
+        return match[1]
 
     # Boxes, where an imported mesh has no node for a thing.
 

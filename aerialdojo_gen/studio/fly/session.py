@@ -65,7 +65,7 @@ class Session(AgentBase):
         self._next_scene = ""
         self.error: Exception | None = None
         self._changed = threading.Condition()
-        self._given: str | int | None = None
+        self._choice: str | int | None = None
         self._closing = False
         self._state: dict[str, Any] = {
             "version": 0, "phase": "busy", "agent": evaluation.agent, "run": evaluation.run, "log": str(log),
@@ -76,14 +76,14 @@ class Session(AgentBase):
         with self._changed:
             return dict(self._state)
 
-    def submit(self, version: int, given: str | int) -> dict[str, Any]:
+    def submit(self, version: int, choice: str | int) -> dict[str, Any]:
         """Hand the loop the person's choice, and return the state after it; StaleError if that is not asked for."""
         with self._changed:
             phase = self._state["phase"]
-            fits = phase == "flying" if isinstance(given, int) else (phase, given) in _BUTTONS
+            fits = phase == "flying" if isinstance(choice, int) else (phase, choice) in _BUTTONS
             if version != self._state["version"] or not fits:
                 raise StaleError("the page was behind: nothing was done")
-            self._given = given
+            self._choice = choice
             self._set(version=version + 1, phase="busy")
             self._changed.notify_all()
             self._changed.wait_for(lambda: self._state["phase"] != "busy" or self._closing, _PATIENCE_S)
@@ -186,23 +186,23 @@ class Session(AgentBase):
         finished, successes = self.counts()
         self._set(selected=self._rows.num_rows, flown=finished, successes=successes)
 
-    def _set(self, **shown: Any) -> None:
+    def _set(self, **fields: Any) -> None:
         with self._changed:
-            self._state |= shown
+            self._state |= fields
 
-    def _show(self, phase: str, **shown: Any) -> None:
+    def _show(self, phase: str, **fields: Any) -> None:
         with self._changed:
-            self._set(version=self._state["version"] + 1, phase=phase, **shown)
+            self._set(version=self._state["version"] + 1, phase=phase, **fields)
             self._changed.notify_all()
 
-    def _wait(self, phase: str, **shown: Any) -> str | int:
+    def _wait(self, phase: str, **fields: Any) -> str | int:
         with self._changed:
-            self._given = None
-            self._show(phase, **shown)
-            self._changed.wait_for(lambda: self._given is not None or self._closing)
-            if self._given is None:
+            self._choice = None
+            self._show(phase, **fields)
+            self._changed.wait_for(lambda: self._choice is not None or self._closing)
+            if self._choice is None:
                 raise _ClosingError("the command has ended")
-            return self._given
+            return self._choice
 
 
 # What may be chosen where, beside the actions of a flight.

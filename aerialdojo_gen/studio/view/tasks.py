@@ -55,12 +55,12 @@ class TaskList:
         parts = [
             _filter(self._table(scene), setting, split, words.lower().split()) for scene in scenes or self._names
         ]
-        found = pa.concat_tables(parts, promote_options="default").unify_dictionaries()
-        key = pc.utf8_slice_codeunits(found[order], -12) if order == "nav_id" else found[order]
-        sort = pa.table({"key": key, "id": found["nav_id"]})
+        matches = pa.concat_tables(parts, promote_options="default").unify_dictionaries()
+        key = pc.utf8_slice_codeunits(matches[order], -12) if order == "nav_id" else matches[order]
+        sort = pa.table({"key": key, "id": matches["nav_id"]})
         rank = pc.sort_indices(sort, [("key", "descending" if descending else "ascending"), ("id", "ascending")])
-        rows = found.take(rank.slice(offset, most)).to_pylist()
-        return {"total": found.num_rows, "tasks": [_to_json(row) for row in rows]}
+        rows = matches.take(rank.slice(offset, most)).to_pylist()
+        return {"total": matches.num_rows, "tasks": [_to_json(row) for row in rows]}
 
 
 def _rows_of(values: pa.ChunkedArray, keys: pa.ChunkedArray) -> pa.ChunkedArray:

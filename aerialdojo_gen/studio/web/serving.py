@@ -41,10 +41,10 @@ def _refusal(request: Request, max_body_bytes: int, any_host: bool) -> tuple[str
     """Say why a request of a foreign host or origin, or with a large body, is refused, and by which status."""
     headers, port = request.headers, request.scope["server"][1]
     hosts = {f"{name}:{port}" for name in _LOCAL} | (set(_LOCAL) if port == 80 else set())
-    found = [host.lower() for host in headers.getlist("host")]
+    asked_for = [host.lower() for host in headers.getlist("host")]
     if any_host:
-        hosts |= set(found)
-    if len(found) != 1 or found[0] not in hosts:
+        hosts |= set(asked_for)
+    if len(asked_for) != 1 or asked_for[0] not in hosts:
         return "only 127.0.0.1 and localhost are allowed", 403
     foreign = any(origin.lower() not in {f"http://{host}" for host in hosts} for origin in headers.getlist("origin"))
     if foreign or headers.get("sec-fetch-site", "none") in ("cross-site", "same-site"):
