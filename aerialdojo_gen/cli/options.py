@@ -80,14 +80,13 @@ def remember_option(ctx: typer.Context, param: typer.CallbackParam, value: Any) 
 Data = Annotated[
     str,
     typer.Option(
-        "--data", metavar="DIR|URL", envvar="AERIALDOJO_DATA", callback=remember_option,
+        metavar="DIR|URL", envvar="AERIALDOJO_DATA", callback=remember_option,
         help="Data directory or s3://bucket/prefix, for tables, meshes and the release.",
     ),
 ]  # fmt: skip
 Scene = Annotated[
     list[str] | None,
     typer.Option(
-        "--scene",
         metavar="NAME|GLOB",
         autocompletion=complete_scenes,
         help="Scene or glob, repeatable: --scene 'U_*'.  (default: all)",
@@ -101,42 +100,35 @@ Scenes = Annotated[
 Split = Annotated[
     list[str] | None,
     typer.Option(
-        "--split",
-        help="id_train, id_test, ood_train, ood_test; train or test for both ID and OOD; repeatable.  (default: all)",
+        help="id_train, id_test, ood_train, ood_test; train or test for both ID and OOD; repeatable.  (default: all)"
     ),
 ]
 Setting = Annotated[
-    list[str] | None, typer.Option("--setting", help="base, standard, long_horizon; repeatable.")
+    list[str] | None, typer.Option(help="base, standard, long_horizon; repeatable.")
 ]  # fmt: skip
-Modality = Annotated[list[str] | None, typer.Option("--modality", help="semantic or image.  (default: both)")]
+Modality = Annotated[list[str] | None, typer.Option(help="semantic or image.  (default: both)")]
 TaskLimit = Annotated[
     int | None,
     typer.Option(
-        "--limit",
         min=1,
         help="Maximum number of tasks in total, spread evenly over scenes; semantic and image goals count "
         "separately.  (default: all)",
     ),
 ]
-SelectionSeed = Annotated[int, typer.Option("--seed", min=0, help="Seed for the selection of tasks by --limit.")]
+SelectionSeed = Annotated[int, typer.Option(min=0, help="Seed for the selection of tasks by --limit.")]
 Hints = Annotated[
     list[str] | None,
-    typer.Option("--tell", help="Give agents more than the goal: heading, the direction they face at the start."),
+    typer.Option(help="Give agents more than the goal: heading, the direction they face at the start."),
 ]
 Out = Annotated[
-    str | None,
-    typer.Option("--out", metavar="DIR|URL", help="Where to write the log.  (default: the data directory)"),
+    str | None, typer.Option(metavar="DIR|URL", help="Where to write the log.  (default: the data directory)")
 ]
 SubmissionFile = Annotated[
-    Path | None,
-    typer.Option(
-        "--submission", metavar="FILE", help="Write the finished run into this file too, for score to replay."
-    ),
+    Path | None, typer.Option(metavar="FILE", help="Write the finished run into this file too, for score to replay.")
 ]
 PipelineFile = Annotated[
     Path | None,
     typer.Option(
-        "--pipeline",
         metavar="FILE|NAME",
         callback=remember_option,
         autocompletion=complete_pipelines,
@@ -154,23 +146,15 @@ PipelineArgument = Annotated[
     ),
 ]
 Workers = Annotated[
-    int | None,
-    typer.Option("--workers", metavar="N", min=1, max=1024, help="Number of processes.  (default: one per core)"),
+    int | None, typer.Option(metavar="N", min=1, max=1024, help="Number of processes.  (default: one per core)")
 ]
-ExecutorName = Annotated[
-    str, typer.Option("--executor", metavar="local|ray", help="Run on this machine or on a Ray cluster.")
-]
+ExecutorName = Annotated[str, typer.Option(metavar="local|ray", help="Run on this machine or on a Ray cluster.")]
 Address = Annotated[
     str | None,
-    typer.Option(
-        "--address",
-        metavar="HOST:PORT",
-        help="Address of a running Ray cluster.  (default: start one on this machine)",
-    ),
+    typer.Option(metavar="HOST:PORT", help="Address of a running Ray cluster.  (default: start one on this machine)"),
 ]
 Protocol = Annotated[
-    Literal["paper"] | None,
-    typer.Option("--protocol", help="paper: the tasks of the paper's sample alone, two maps a family."),
+    Literal["paper"] | None, typer.Option(help="paper: the tasks of the paper's sample alone, two maps a family.")
 ]
 Force = Annotated[bool, typer.Option("--force", help="Compute this stage again even where it is up to date.")]
 Replace = Annotated[
@@ -182,12 +166,11 @@ OneScene = Annotated[
     typer.Argument(metavar="SCENE", autocompletion=complete_scenes, help="Scene, or a glob that matches one."),
 ]
 SceneOption = Annotated[
-    str | None,
-    typer.Option("--scene", metavar="NAME|GLOB", autocompletion=complete_scenes, help="The same as SCENE."),
+    str | None, typer.Option(metavar="NAME|GLOB", autocompletion=complete_scenes, help="The same as SCENE.")
 ]
 RendererName = Annotated[
     Literal["auto", "gl", "pybullet"],
-    typer.Option("--renderer", help="Renderer; auto takes the fastest that works on this machine."),
+    typer.Option(help="Renderer; auto takes the fastest that works on this machine."),
 ]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print no progress and no summary.")]
 Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Print a line also for stages that are up to date.")]
