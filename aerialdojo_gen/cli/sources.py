@@ -21,7 +21,6 @@ from aerialdojo_gen.store.root import open_root
 
 if TYPE_CHECKING:
     from aerialdojo_gen.base.config.pipeline import Pipeline
-    from aerialdojo_gen.benchmark.llm.agent import LanguageModelAgent
     from aerialdojo_gen.imports.command import AddedScene
     from aerialdojo_gen.pipeline.stage import ProjectPaths
 
@@ -177,29 +176,23 @@ def annotate_draft(
     )
     reporter = Reporter(quiet=quiet)
     fresh = rewrite is None or force or not (roots.annotations / f"{scene}.json").exists()
-    agent = None if rewrite is None else _writer(rewrite, option or [], max_cost)
+    agent = None
+    if rewrite is not None:
+        from aerialdojo_gen.studio.annotate.rewrite import make_agent, rewrite_scene
+
+        agent = make_agent(rewrite, key_values(option or []))
+        if max_cost is not None and not agent.priced:
+            prices = "--option input_usd_per_million=… --option output_usd_per_million=…"
+            raise UsageError(f"--max-cost needs prices: {prices}")
     if fresh:
         print(draft_scene(scene, config, roots, options, force=force, reporter=reporter))
     if agent is not None:
         from aerialdojo_gen.benchmark.evaluation import Limits
-        from aerialdojo_gen.studio.annotate.rewrite import rewrite_scene
 
         limits = Limits(max_cost, max_tokens) if yes or (max_tokens, max_cost) != (None, None) else None
         rewrite_scene(scene, roots, agent, limits, again=fresh, say=print)
         if limits is None:
             print("nothing was sent: --yes sends it; --max-tokens or --max-cost sends it up to a limit")
-
-
-def _writer(protocol: str, option: list[str], max_cost: float | None) -> LanguageModelAgent:
-    """Make the client of ``--rewrite``."""
-    from aerialdojo_gen.studio.annotate.rewrite import make_agent
-
-    agent = make_agent(protocol, key_values(option))
-    if max_cost is not None and not agent.priced:
-        raise UsageError(
-            "--max-cost needs prices: --option input_usd_per_million=… --option output_usd_per_million=…"
-        )
-    return agent
 
 
 @app.command("gallery")

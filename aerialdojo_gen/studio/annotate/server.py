@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-from fastapi import FastAPI, Header, Query, Request
+from fastapi import Depends, FastAPI, Header, Query, Request
 from fastapi.responses import JSONResponse, PlainTextResponse, RedirectResponse, Response
 from fastapi.staticfiles import StaticFiles
 from pydantic import Field, StrictFloat, StrictStr, field_validator
@@ -110,8 +110,20 @@ MAX_BYTES = 8 << 20
 
 _Metres = Annotated[StrictFloat, Field(allow_inf_nan=False, ge=-1e5, le=1e5)]
 _Triple = tuple[_Metres, _Metres, _Metres]
-_Match = Annotated[str | None, Header(alias="If-Match", max_length=80)]
 _Object = Annotated[int, Field(ge=0, le=2**31 - 1)]
+
+
+def _version(header: str | None) -> str:
+    return (header or "").removeprefix("W/").strip('"')
+
+
+def _sent_version(if_match: Annotated[str | None, Header(max_length=80)] = None) -> str:
+    if not if_match:
+        raise AerialDojoError("the If-Match header with the version is missing")
+    return _version(if_match)
+
+
+_Version = Annotated[str, Depends(_sent_version)]
 
 
 class AuthoredRequest(Strict):
@@ -223,28 +235,25 @@ def _add_document(app: FastAPI, session: AnnotationSession) -> None:
         return _with_version(session.document(client))
 
     @app.post("/api/operations")
-    def operate(body: OperationRequest, if_match: _Match = None) -> Response:
-        version = _required(if_match)
+    def operate(body: OperationRequest, version: _Version) -> Response:
         try:
             return _with_version(session.change(version, body.author, body.operation))
         except (StoreError, AnnotationError) as error:
             # A full disk or a half-written file is not the client's fault: it retries.
             return JSONResponse({"error": one_line(str(error))}, status_code=503)
 
-    def saved(change: Any, body: AuthoredRequest, if_match: str | None, *content: bytes) -> Response:
-        return _with_version(session.saved(change(_required(if_match), body.author, *content), body.author))
-
     @app.post("/api/undo")
-    def undo(body: AuthoredRequest, if_match: _Match = None) -> Response:
-        return saved(session.storage.undo, body, if_match)
+    def undo(body: AuthoredRequest, version: _Version) -> Response:
+        return _with_version(session.saved(session.storage.undo(version, body.author), body.author))
 
     @app.post("/api/redo")
-    def redo(body: AuthoredRequest, if_match: _Match = None) -> Response:
-        return saved(session.storage.redo, body, if_match)
+    def redo(body: AuthoredRequest, version: _Version) -> Response:
+        return _with_version(session.saved(session.storage.redo(version, body.author), body.author))
 
     @app.post("/api/import")
-    def import_file(body: ImportRequest, if_match: _Match = None) -> Response:
-        return saved(session.storage.replace, body, if_match, body.text.encode("utf-8", "replace"))
+    def import_file(body: ImportRequest, version: _Version) -> Response:
+        content = body.text.encode("utf-8", "replace")
+        return _with_version(session.saved(session.storage.replace(version, body.author, content), body.author))
 
     @app.post("/api/draft")
     def draft(body: OperationRequest) -> dict[str, Any]:
@@ -325,16 +334,6 @@ def _viewpoint_json(session: AnnotationSession, node: str, row: dict[str, Any], 
 def _near(session: AnnotationSession, place: Any) -> bool:
     low, high = session.scene.bounds
     return bool((place >= low - 5).all() and (place <= high + 5).all())
-
-
-def _version(header: str | None) -> str:
-    return (header or "").removeprefix("W/").strip('"')
-
-
-def _required(header: str | None) -> str:
-    if not header:
-        raise AerialDojoError("the If-Match header with the version is missing")
-    return _version(header)
 
 
 def _with_version(document: dict[str, Any]) -> JSONResponse:

@@ -109,23 +109,16 @@ def local_app(
         return Response(status_code=204)
 
     @app.exception_handler(AerialDojoError)
-    def expected(_: Request, error: Exception) -> JSONResponse:
-        return error_response(error, 404 if isinstance(error, UsageError) else 400)
-
     @app.exception_handler(RequestValidationError)
-    def malformed(_: Request, error: Exception) -> JSONResponse:
-        assert isinstance(error, RequestValidationError)
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"])
-        return error_response(f"malformed request: {where}: {first['msg']}", 422)
-
     @app.exception_handler(HTTPException)
     def refused(_: Request, error: Exception) -> JSONResponse:
-        assert isinstance(error, HTTPException)
-        return error_response(error.detail, error.status_code)
-
-    def error_response(what: object, status: int) -> JSONResponse:
-        return JSONResponse({"error": one_line(str(what))}, status_code=status)
+        message, status = str(error), 404 if isinstance(error, UsageError) else 400
+        if isinstance(error, RequestValidationError):
+            first = error.errors()[0]
+            message, status = f"malformed request: {'.'.join(map(str, first['loc']))}: {first['msg']}", 422
+        elif isinstance(error, HTTPException):
+            message, status = error.detail, error.status_code
+        return JSONResponse({"error": one_line(message)}, status)
 
     app.mount("/static", StaticFiles(directory=STATIC, follow_symlink=False), name="static")
     return app
