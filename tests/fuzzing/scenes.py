@@ -97,6 +97,10 @@ _COURT = {
 }  # fmt: skip
 
 
+def _plans() -> list[Case]:
+    return [{f"scenes/{name}.toml": toml_dumped(plan).encode()} for name, plan in PLANS.items()]
+
+
 def _build(folder: Path) -> None:
     (path,) = folder.rglob("*.toml")
     write_glb(build_scene(path, load_catalogue(ASSETS)), path.with_suffix(".glb"))
@@ -137,13 +141,8 @@ def _instantiate(folder: Path) -> None:
 
 def _materials() -> list[Case]:
     own = {"brick": {"texture": "brick", "colour": "#9a4a3c", "tile_m": 0.75}, "paint": {"colour": "#808080"}}
-    prop = {
-        "post": {
-            "name": "post",
-            "roles": {"body": "brick"},
-            "parts": [{"shape": "box", "role": "body", "size": [1, 1, 2]}],
-        }
-    }
+    box = {"shape": "box", "role": "body", "size": [1, 1, 2]}
+    prop = {"post": {"name": "post", "roles": {"body": "brick"}, "parts": [box]}}
     return [{"materials.toml": toml_dumped(own).encode(), f"{FOLDERS[1]}/x.toml": toml_dumped(prop).encode()}]
 
 
