@@ -226,9 +226,11 @@ class ForkServer:
 
 
 @contextlib.contextmanager
-def killed_at(program: str, **variables: str) -> Iterator[Callable[[int, Path], int]]:
+def killed_at(
+    program: str, imports: str = "import aerialdojo_gen.store.atomic", **variables: str
+) -> Iterator[Callable[[int, Path], int]]:
     """Yield a function of n and a folder: run a program on it, killed at its n-th call; gives its exit status."""
-    with contextlib.closing(ForkServer("import aerialdojo_gen.store.atomic", program, **variables)) as server:
+    with contextlib.closing(ForkServer(imports, program, **variables)) as server:
         yield lambda n, folder: server.run([folder], {"PRELOAD_KILL_AT": str(n)})
 
 
