@@ -1,14 +1,13 @@
 """The annotation page in a real browser: a foreign mesh up to tasks; two tabs at odds; a server that dies."""
 
 import contextlib
-import http.client
 import itertools
 import json
 import socket
 import threading
 import time
-import urllib.request
 
+import httpx
 import pyarrow.compute as pc
 import pytest
 from support import browser as chrome
@@ -227,14 +226,12 @@ def test_the_page_keeps_its_shape_its_selection_and_what_is_typed(browser, page,
 
 def rename_on_and_on(url, answered):
     """Change an object's name again and again, as another program, until nobody answers."""
-    with contextlib.suppress(OSError, http.client.HTTPException):
-        version = json.loads(urllib.request.urlopen(url + "api/document").read())["version"]
+    with httpx.Client(base_url=url) as client, contextlib.suppress(httpx.HTTPError):
+        version = client.get("api/document").json()["version"]
         for n in itertools.count():
             operation = {"do": "change", "kind": "objects", "id": 1, "fields": {"name": f"thing {n}"}}
-            body = json.dumps({"who": "Robot", "client": "robot", "operation": operation}).encode()
-            headers = {"Content-Type": "application/json", "If-Match": version}
-            answer = urllib.request.urlopen(urllib.request.Request(url + "api/operations", body, headers))
-            version = json.loads(answer.read())["version"]
+            body = {"who": "Robot", "client": "robot", "operation": operation}
+            version = client.post("api/operations", json=body, headers={"If-Match": version}).json()["version"]
             answered.append(n)
 
 

@@ -33,11 +33,13 @@ class Call:
     """A tool call: the model answers by arguments."""
 
     arguments: str
+    usage = (1000, 20)
 
 
-@dataclass(frozen=True)
 class Filtered:
     """A content filter has taken the answer away."""
+
+    usage = (1000, 20)
 
 
 @dataclass(frozen=True)
@@ -66,22 +68,18 @@ class Endless:
     code: int = 200
 
 
-@dataclass(frozen=True)
 class Drip:
     """A byte now and then, for ever: no single read takes long."""
 
 
-@dataclass(frozen=True)
 class Trickle:
     """Headers of 8 bytes every 20 ms: no single read takes long."""
 
 
-@dataclass(frozen=True)
 class Hang:
     """No answer at all."""
 
 
-@dataclass(frozen=True)
 class Cut:
     """The connection is cut in the middle of an answer."""
 
@@ -101,9 +99,6 @@ class Service:
     checks: list[dict[str, Any]] = field(default_factory=list)  # The requests of checks before a run
     refuses: Callable[[dict[str, Any]], Act | None] | None = None  # Answers a check by its body
 
-    def next(self) -> Act:
-        return self.script.pop(0) if len(self.script) > 1 else self.script[0]
-
 
 class _Handler(BaseHTTPRequestHandler):
     protocol_version = "HTTP/1.1"
@@ -119,8 +114,8 @@ class _Handler(BaseHTTPRequestHandler):
             act: Act = (refuses(body) if refuses else None) or _checked(body)
         else:
             self.service.requests.append(seen)
-            policy = self.service.policy
-            said = policy(body) if policy else self.service.next()
+            policy, script = self.service.policy, self.service.script
+            said = policy(body) if policy else script.pop(0) if len(script) > 1 else script[0]
             act = Say(said) if isinstance(said, str) else said
         with contextlib.suppress(BrokenPipeError, ConnectionResetError):
             self.play(act, anthropic=self.path == "/v1/messages")
@@ -136,11 +131,7 @@ class _Handler(BaseHTTPRequestHandler):
         elif isinstance(act, Raw):
             self.send(act.code, act.body, {"content-type": act.content_type})
         elif isinstance(act, Cut):
-            self.send_response(200)
-            self.send_header("content-type", "application/json")
-            self.send_header("content-length", "1000")
-            self.end_headers()
-            self.wfile.write(b'{"id": "x", ')
+            self.send(200, b'{"id": "x", ', {"content-length": "1000"})
             self.close_connection = True
         elif isinstance(act, Trickle):
             self.wfile.write(b"HTTP/1.1 200 OK\r\n")
@@ -165,9 +156,9 @@ class _Handler(BaseHTTPRequestHandler):
 
     def send(self, code: int, body: bytes, headers: dict[str, str] | None = None) -> None:
         self.send_response(code)
-        for name, value in ({"content-type": "application/json"} | (headers or {})).items():
+        usual = {"content-type": "application/json", "content-length": str(len(body))}
+        for name, value in (usual | (headers or {})).items():
             self.send_header(name, value)
-        self.send_header("content-length", str(len(body)))
         self.end_headers()
         self.wfile.write(body)
 
@@ -190,9 +181,9 @@ def _completion(said: Say | Call | Filtered) -> bytes:
         "id": "chatcmpl-1", "object": "chat.completion", "created": 1, "model": "m",
         "choices": [{"index": 0, "message": message, "finish_reason": reason}],
     }  # fmt: skip
-    usage = said.usage if isinstance(said, Say) else (1000, 20)
-    if usage:
-        value["usage"] = {"prompt_tokens": usage[0], "completion_tokens": usage[1], "total_tokens": sum(usage)}
+    if said.usage:
+        into, out = said.usage
+        value["usage"] = {"prompt_tokens": into, "completion_tokens": out, "total_tokens": into + out}
     return json.dumps(value).encode()
 
 
@@ -206,9 +197,8 @@ def _message(said: Say | Call | Filtered) -> bytes:
         "id": "msg_1", "type": "message", "role": "assistant", "model": "m", "stop_reason": "end_turn",
         "stop_sequence": None, "content": content,
     }  # fmt: skip
-    usage = said.usage if isinstance(said, Say) else (1000, 20)
-    if usage:
-        value["usage"] = {"input_tokens": usage[0], "output_tokens": usage[1]}
+    if said.usage:
+        value["usage"] = dict(zip(("input_tokens", "output_tokens"), said.usage, strict=True))
     return json.dumps(value).encode()
 
 
