@@ -109,7 +109,8 @@ class Rewriter:
         done, failures = Rewriting(), 0
         texts: dict[int, str] = {}
         for entry in objects:
-            if failures >= _MAX_FAILURES or self._at_limit(done, limits):
+            cost = self._agent.options.cost_usd(*done.tokens) or 0.0
+            if failures >= _MAX_FAILURES or BudgetTracker(limits, cost, sum(done.tokens)).spent:
                 done.left += 1
                 continue
             try:
@@ -124,10 +125,6 @@ class Rewriter:
                 done.kept += 1
                 texts[entry.id] = text
         return texts, done
-
-    def _at_limit(self, done: Rewriting, limits: Limits) -> bool:
-        cost = self._agent.options.cost_usd(*done.tokens) or 0.0
-        return bool(BudgetTracker(limits, cost, sum(done.tokens)).spent)
 
     def _text(self, entry: Object, done: Rewriting) -> tuple[str, str]:
         """Return a text, and why it is dropped; empty if it is verified."""

@@ -187,6 +187,10 @@ class AnnotationSession:
 
     def cut(self, low_m: Sequence[float], high_m: Sequence[float], category: str) -> dict[str, Any]:
         """Make a node of what lies in a box (corners in world metres); imported scenes only."""
+        if load_imported(self._recipe) is None:
+            raise AerialDojoError(
+                "this scene is built from a recipe, every thing in it has a node: boxes are not needed"
+            )
         slug = re.sub(r"[^a-z0-9]+", "_", category.lower()).strip("_")[:60]
         if not slug:
             raise AerialDojoError("a category is required")
@@ -195,7 +199,8 @@ class AnnotationSession:
             node = next(n for k in itertools.count() if (n := f"{slug}_{k:03d}") not in self.scene)
             cut = Cut(node=node, category=slug, low_m=tuple(low.tolist()), high_m=tuple(high.tolist()))
             cut_out(self.scene, (cut,))
-            self._rebuild(_with_box(self._recipe, cut))
+            keys = "".join(f"{key} = {json.dumps(value)}\n" for key, value in cut.model_dump(mode="json").items())
+            self._rebuild(self._recipe.read_text(encoding="utf-8") + _BOX_HEAD + keys)
         return self.about(node)
 
     def uncut(self, node: str) -> None:
@@ -204,7 +209,11 @@ class AnnotationSession:
         if node in {e.node for e in annotations.landmarks} | {e.node for e in annotations.objects}:
             raise AerialDojoError(f"{node} is annotated: remove its entry first")
         with self._lock, self.storage.locked():
-            self._rebuild(_without_box(self._recipe, node))
+            head, *boxes = self._recipe.read_text(encoding="utf-8").split(_BOX_HEAD)
+            kept = [box for box in boxes if f"node = {json.dumps(node)}\n" not in box]
+            if len(kept) == len(boxes):
+                raise AerialDojoError(f"{node} was not created by a box")
+            self._rebuild(_BOX_HEAD.join([head, *kept]))
 
     @property
     def _recipe(self) -> Path:
@@ -251,23 +260,6 @@ def build(scene: str, pipeline: Pipeline, roots: ProjectPaths) -> None:
     from aerialdojo_gen.pipeline.progress import Reporter
 
     runner.run(runner.stages_named(("build-scenes",)), [scene], pipeline, roots, reporter=Reporter(quiet=True))
-
-
-def _with_box(recipe: Path, cut: Cut) -> str:
-    """Return a recipe's text with a box more."""
-    if load_imported(recipe) is None:
-        raise AerialDojoError("this scene is built from a recipe, every thing in it has a node: boxes are not needed")
-    keys = "".join(f"{key} = {json.dumps(value)}\n" for key, value in cut.model_dump(mode="json").items())
-    return recipe.read_text(encoding="utf-8") + _BOX_HEAD + keys
-
-
-def _without_box(recipe: Path, node: str) -> str:
-    """Return a recipe's text without the box of a node; `AerialDojoError` where there is none."""
-    head, *blocks = recipe.read_text(encoding="utf-8").split(_BOX_HEAD)
-    kept = [block for block in blocks if f"node = {json.dumps(node)}\n" not in block]
-    if len(kept) == len(blocks):
-        raise AerialDojoError(f"{node} was not created by a box")
-    return _BOX_HEAD.join([head, *kept])
 
 
 @contextlib.contextmanager

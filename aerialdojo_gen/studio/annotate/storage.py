@@ -23,7 +23,7 @@ from aerialdojo_gen.annotations.format import Annotations, Strict, format_annota
 from aerialdojo_gen.base.errors import AnnotationError, brief, disk_error
 from aerialdojo_gen.store.layout import check_scene_name
 from aerialdojo_gen.studio.annotate import document
-from aerialdojo_gen.studio.annotate.document import ConflictError, Edit, Kind, Operation
+from aerialdojo_gen.studio.annotate.document import ConflictError, Edit, Operation
 
 Action = Literal["do", "undo", "redo", "import", "outside"]
 
@@ -91,10 +91,6 @@ class History:
         start = last + 1 if last is not None else first if first is not None else 0
         yield from self.records[start:]
 
-    def highest_id(self, kind: str) -> int:
-        """Return the highest id that a kind of entry ever had; -1 if none."""
-        return max((e.id for record in self.records for e in record.edits if e.kind == kind), default=-1)
-
 
 @dataclass(frozen=True)
 class State:
@@ -151,7 +147,10 @@ class Storage:
         """Apply an operation and save it."""
 
         def edits(state: State) -> list[Edit]:
-            return document.edits_of(operation, state.annotations, self._next_id(state, operation.kind))
+            # No id is used again, of an entry that is gone either.
+            ids = {entry.id for entry in getattr(state.annotations, operation.kind)}
+            ids |= {e.id for record in self.history.records for e in record.edits if e.kind == operation.kind}
+            return document.edits_of(operation, state.annotations, max(ids, default=-1) + 1)
 
         return self._commit(version, author, "do", edits)
 
@@ -176,10 +175,6 @@ class Storage:
             return [edit for record in self.history.stacks(author.client)[1][-1:] for edit in record.edits]
 
         return self._commit(version, author, "redo", edits)
-
-    def _next_id(self, state: State, kind: Kind) -> int:
-        present = max((entry.id for entry in getattr(state.annotations, kind)), default=-1)
-        return max(present, self.history.highest_id(kind)) + 1
 
     def _commit(
         self, version: str, author: Author, action: Action, edits_of_state: Callable[[State], Sequence[Edit]]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import groupby
-from pathlib import Path
 from typing import Any
 
 import cv2
@@ -23,7 +22,7 @@ from aerialdojo_gen.geometry.motion import sampled
 from aerialdojo_gen.rendering.orthographic import OrthographicPictures, orthographic_pictures
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
-from aerialdojo_gen.store.root import DataRoot, is_outside
+from aerialdojo_gen.store.root import is_outside
 
 SIZE_PX = 320
 
@@ -78,20 +77,16 @@ def _recorded(task: TaskRecord, steps: list[int]) -> list[NDArray[np.uint8]] | N
     first = dict(zip(frames["step"].to_pylist(), frames["frame"].to_pylist(), strict=True))
     if any(step not in first for step in steps):
         return None
-    video = open_view(_local_video(root, path), "front", "rgb")
+    if is_outside(root, path):
+        raise StoreError(f"recordings: path {path!r} points outside {root}")
+    try:
+        video = open_view(root.local_copy(path), "front", "rgb")
+    except FileNotFoundError:
+        raise StoreError(f"the recording {root.at(path)} is missing: run {command('render')}") from None
     return [
         np.asarray(cv2.resize(video[first[step]], (SIZE_PX, SIZE_PX), interpolation=cv2.INTER_AREA), dtype=np.uint8)
         for step in steps
     ]
-
-
-def _local_video(root: DataRoot, path: str) -> Path:
-    if is_outside(root, path):
-        raise StoreError(f"recordings: path {path!r} points outside {root}")
-    try:
-        return root.local_copy(path)
-    except FileNotFoundError:
-        raise StoreError(f"the recording {root.at(path)} is missing: run {command('render')}") from None
 
 
 Floats = NDArray[np.float64]
