@@ -19,10 +19,6 @@ def _aerialdojo() -> list[Case]:
     ]
 
 
-def _written(document: Callable[[Path], object]) -> Callable[[], list[Case]]:
-    return lambda: [made(lambda folder: task_files.write(folder / "tasks.json", document(folder)))]
-
-
 def _import(format_name: str, file: str = "tasks.json") -> Callable[[Path], None]:
     def run(folder: Path) -> None:
         frame = "ned" if format_name in ("cityavos", "openfly") else None
@@ -41,7 +37,10 @@ def _import(format_name: str, file: str = "tasks.json") -> Callable[[Path], None
 
 
 def _of(format_name: str, document: Callable[[Path], object]) -> Target:
-    return Target(_written(document), _import(format_name), ".json", names_the_file=False)
+    def cases() -> list[Case]:
+        return [made(lambda folder: task_files.write(folder / "tasks.json", document(folder)))]
+
+    return Target(cases, _import(format_name), ".json", names_the_file=False)
 
 
 TARGETS = {

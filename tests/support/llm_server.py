@@ -111,7 +111,8 @@ class _Handler(BaseHTTPRequestHandler):
         if "This is a test of the connection" in json.dumps(body):
             self.service.checks.append(seen)
             refuses = self.service.refuses
-            act: Act = (refuses(body) if refuses else None) or _checked(body)
+            answer = (Call if "tools" in body else Say)('{"thought": "a test", "action": "Stop"}')
+            act: Act = (refuses(body) if refuses else None) or answer
         else:
             self.service.requests.append(seen)
             policy, script = self.service.policy, self.service.script
@@ -164,11 +165,6 @@ class _Handler(BaseHTTPRequestHandler):
 
     def log_message(self, format: str, *args: Any) -> None:
         """Say nothing on stderr."""
-
-
-def _checked(body: dict[str, Any]) -> Act:
-    answer = '{"thought": "a test", "action": "Stop"}'
-    return Call(answer) if "tools" in body else Say(answer)
 
 
 def _completion(said: Say | Call | Filtered) -> bytes:
