@@ -150,11 +150,7 @@ TARGETS = {
     "annotations": Target(_annotations, _read_annotations),
     "pipeline": Target(_pipelines, lambda folder: load_pipeline(folder / "p.toml").model_dump_json()),
     "recipe": Target(lambda: [{"scenes/U_Court_0.toml": toml_dumped(_COURT).encode()}], _build),
-    "plan": Target(
-        lambda: [{f"scenes/{name}.toml": toml_dumped(plan).encode()} for name, plan in PLANS.items()],
-        _build,
-        share=0.05,
-    ),
+    "plan": Target(_plans, _build, share=0.05),
     "recipe-imported": Target(_imported_recipes, _build, ".toml", names_the_file=False),
     "prop": Target(_props, _instantiate, "x.toml"),
     "materials": Target(_materials, _instantiate),
