@@ -19,8 +19,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.compute as pc
+import pandas as pd
 import pyarrow.dataset as ds
 import pyarrow.parquet as pq
 
@@ -60,35 +59,39 @@ def share(mask: Any) -> float:
     return 100 * float(np.mean(np.asarray(mask, float)))
 
 
+def frame(folder: Path, *columns: str) -> pd.DataFrame:
+    """Columns of a table; `split` is the folder of a file."""
+    folders = ["split"] if "split" in columns else None
+    return ds.dataset(folder, format="parquet", partitioning=folders).to_table([*columns]).to_pandas()
+
+
 def of_routes(release: Path) -> dict[str, float]:
     """What the reference routes are like."""
-    names = ["setting", "length_m", "n_actions", "min_clearance_m", "plan_detour", "straight_line_free", "action"]
-    folder = ds.dataset(release / "routes", format="parquet", partitioning=["subset"])
-    routes = folder.to_table([*names, "target_visible_at_start", "subset"])
-    setting = routes["setting"].to_numpy()
-    subset = np.asarray(routes["subset"].to_pylist())
-    detour, seen = routes["plan_detour"].to_numpy(), routes["target_visible_at_start"].to_numpy()
-    poses = pc.list_value_length(routes["action"]).to_numpy()
+    routes = frame(
+        release / "routes", "setting", "length_m", "min_clearance_m", "plan_detour", "straight_line_free", "action",
+        "target_visible_at_start", "split",
+    )  # fmt: skip
+    poses, detour = routes["action"].str.len(), routes["plan_detour"]
+    quartiles = routes["min_clearance_m"].quantile([0.25, 0.5, 0.75])
     facts = {
-        "routes_km": pc.sum(routes["length_m"]).as_py() / 1000,
+        "routes_km": routes["length_m"].sum() / 1000,
         "poses": int(poses.sum()),
-        "poses_id_train": int(poses[subset == "id_train"].sum()),
-        "poses_train": int(poses[np.char.endswith(subset, "_train")].sum()),
-        "detour_median": float(np.median(detour)),
-        "detour_p90": float(np.quantile(detour, 0.9)),
+        "poses_id_train": int(poses[routes["split"] == "id_train"].sum()),
+        "poses_train": int(poses[routes["split"].str.endswith("_train")].sum()),
+        "detour_median": float(detour.median()),
+        "detour_p90": float(detour.quantile(0.9)),
+        **dict(zip(("clearance_q1_m", "clearance_median_m", "clearance_q3_m"), quartiles, strict=True)),
     }
-    quartiles = np.quantile(routes["min_clearance_m"].to_numpy(), (0.25, 0.5, 0.75))
-    facts |= dict(zip(("clearance_q1_m", "clearance_median_m", "clearance_q3_m"), map(float, quartiles), strict=True))
     for name in ("all", *SETTINGS):
-        some = np.full(len(setting), True) if name == "all" else setting == name
-        if not some.any():
+        some = routes if name == "all" else routes[routes["setting"] == name]
+        if some.empty:
             continue
-        action = pc.list_flatten(routes["action"].filter(pa.array(some))).to_numpy()
+        action = np.concatenate(some["action"].to_list())
         level = np.hypot(DISPLACEMENTS[action, 0], DISPLACEMENTS[action, 1]).sum()
         facts |= {
-            f"easy_detour_{name}_percent": share(detour[some] < DETOUR),
-            f"straight_free_{name}_percent": share(routes["straight_line_free"].to_numpy()[some]),
-            f"in_view_{name}_percent": share(seen[some] > 0),
+            f"easy_detour_{name}_percent": share(some["plan_detour"] < DETOUR),
+            f"straight_free_{name}_percent": share(some["straight_line_free"]),
+            f"in_view_{name}_percent": share(some["target_visible_at_start"] > 0),
             f"sideways_{name}_percent": 100 * float(np.abs(DISPLACEMENTS[action, 1]).sum() / level),
             f"turns_{name}_percent": share(TURNS[action] != 0),
         }
@@ -97,12 +100,10 @@ def of_routes(release: Path) -> dict[str, float]:
 
 def of_tasks(release: Path) -> dict[str, float]:
     """What the splits leave unseen, what a language model would be asked, and goals with another viewpoint."""
-    folder = ds.dataset(release / "tasks", format="parquet", partitioning=["split"])
     seen = [f"{what}_seen_in_train" for what in ("target", "start", "pair")]
-    read = ["nav_id", "split", "setting", "action_budget", "modality", *seen]
-    tasks = folder.to_table(read).to_pandas()
-    read = ["nav_id", "n_actions", "scene", "target_object_id", "goal_x_m", "goal_y_m", "goal_z_m"]
-    routes = ds.dataset(release / "routes", format="parquet").to_table(read).to_pandas()
+    tasks = frame(release / "tasks", "nav_id", "split", "setting", "action_budget", "modality", *seen)
+    goal = ["goal_x_m", "goal_y_m", "goal_z_m"]
+    routes = frame(release / "routes", "nav_id", "n_actions", "scene", "target_object_id", *goal)
     facts: dict[str, float] = {}
     one_each = tasks[tasks["modality"] == "semantic"]
     tests = [subset for subset in SUBSETS if subset.endswith("_test")]
@@ -111,28 +112,26 @@ def of_tasks(release: Path) -> dict[str, float]:
         facts |= {
             f"{subset}_tasks": len(mine),
             f"{subset}_unseen_targets": int((~mine["target_seen_in_train"]).sum()),
+            f"{subset}_unseen_targets_percent": share(~mine["target_seen_in_train"]),
+            f"{subset}_unseen_starts_percent": share(~mine["start_seen_in_train"]),
+            f"{subset}_seen_pairs_percent": share(mine["pair_seen_in_train"]),
         }
-        facts[f"{subset}_unseen_targets_percent"] = share(~mine["target_seen_in_train"])
-        facts[f"{subset}_unseen_starts_percent"] = share(~mine["start_seen_in_train"])
-        facts[f"{subset}_seen_pairs_percent"] = share(mine["pair_seen_in_train"])
     asked = tasks[tasks["split"].isin(tests) & (tasks["setting"] == "base")]
     # Without the Approach, which is no action of an agent.
     actions = asked.merge(routes[["nav_id", "n_actions"]], on="nav_id")["n_actions"] - 1
     facts |= {"base_test_episodes": len(asked), "base_test_reference_actions": int(actions.sum())}
     facts["base_test_budget"] = int(asked["action_budget"].sum())
-    read = ["scene", "object_id", "x_m", "y_m", "z_m"]
-    anchors = ds.dataset(release / "anchors", format="parquet").to_table(read).to_pandas()
+    anchors = frame(release / "anchors", "scene", "object_id", "x_m", "y_m", "z_m")
     both = routes.merge(anchors, left_on=["scene", "target_object_id"], right_on=["scene", "object_id"])
-    offset = both[["x_m", "y_m", "z_m"]].to_numpy() - both[["goal_x_m", "goal_y_m", "goal_z_m"]].to_numpy()
+    offset = both[["x_m", "y_m", "z_m"]].to_numpy() - both[goal].to_numpy()
     far = both.loc[np.linalg.norm(offset, axis=1) > SUCCESS_RADIUS_M, "nav_id"]
     return facts | {"other_viewpoint_percent": share(routes["nav_id"].isin(far))}
 
 
 def of_plans(data: Path) -> dict[str, float]:
     """By how many percent routes are longer than predicted: median, 10th and 90th percentile."""
-    plans = ds.dataset(data / "plans", format="parquet").to_table(["predicted_length_m", "length_m", "outcome"])
-    plans = plans.filter(pc.equal(plans["outcome"], "SOLVED"))
-    excess = 100 * (plans["length_m"].to_numpy() / plans["predicted_length_m"].to_numpy() - 1)
+    plans = frame(data / "plans", "predicted_length_m", "length_m", "outcome").query("outcome == 'SOLVED'")
+    excess = 100 * (plans["length_m"] / plans["predicted_length_m"] - 1)
     p10, median, p90 = (float(value) for value in np.nanquantile(excess, (0.1, 0.5, 0.9)))
     return {"longer_p10_percent": p10, "longer_median_percent": median, "longer_p90_percent": p90}
 

@@ -10,6 +10,7 @@ import zipfile
 
 import pytest
 from packaging.requirements import Requirement
+from support.releases import files_of
 
 
 @pytest.fixture(scope="module")
@@ -79,35 +80,9 @@ def test_a_wheel_finds_nothing_to_do_after_a_checkout_and_makes_the_same_bytes(u
     assert last.endswith("or make one with aerialdojo-gen run aerialdojo-200k\n")
 
 
-def test_pipelines_and_recipes_that_are_shipped_go_by_their_names_anywhere(unpacked, project, tmp_path):
-    names = sorted(path.stem for path in (project / "pipelines").glob("*.toml"))
-    assert {"smoke", "aerialdojo-200k"} <= set(names)
-    program = """
-import sys
-from pathlib import Path
-from aerialdojo_gen.dataset.build import open_pipeline
-from aerialdojo_gen.learning.recipe import load_recipe
-path, *names = sys.argv[1:]
-print(*[open_pipeline(name, "d")[0].name for name in names])
-for name in ("imitation", "imitation.toml", path):
-    print(load_recipe(name).model_dump_json())
-Path("imitation").write_text('name = "mine"\\n')
-print(load_recipe("imitation").name)
-try:
-    load_recipe("imitatoin")
-except Exception as error:
-    print(error)
-"""
-    recipe = project / "pipelines" / "baselines" / "imitation.toml"
-    found, *same, mine, told = python(unpacked, tmp_path, program, str(recipe), *names)[0].splitlines()
-    assert found.split() == names
-    assert len(same) == 3
-    assert len(set(same)) == 1
-    assert mine == "mine"  # a file goes before a name
-    by_name = (
-        "no recipe imitatoin; by name, as in aerialdojo-gen train imitation: adapt, adapt-mall, blind, imitation"
-    )
-    assert by_name in told
+def test_a_wheel_carries_the_checkouts_pipelines_recipes_plans_and_annotations(unpacked, project):
+    for name in ("annotations", "pipelines", "scene_assets"):
+        assert files_of(unpacked / "aerialdojo_gen" / "_shipped" / name) == files_of(project / name), name
 
 
 @pytest.mark.parametrize(

@@ -11,11 +11,7 @@ makes of write, rename, renameat2, fsync, syncfs, mkdir, rmdir, unlink, link and
 from __future__ import annotations
 
 import argparse
-import contextlib
 import functools
-import importlib
-import json
-import os
 import random  # noqa: TID251 - which kills, not what is generated
 import shutil
 import signal
@@ -23,14 +19,12 @@ import subprocess
 import sys
 import tempfile
 import time
-import traceback
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
-from support import chores
-from support.preload import library
+from support.preload import ForkServer
 
 ROOT = Path(__file__).resolve().parent.parent
 SCENE, OTHER = "U_Courtyard_0", "U_Courtyard_1"
@@ -114,80 +108,28 @@ KINDS = {
 }  # fmt: skip
 
 
-class Server:
-    """A process that has imported everything and becomes the command in a child of its own: imports are not tried."""
-
-    def __init__(self) -> None:
-        self._process = subprocess.Popen(
-            [sys.executable, __file__, "--serve"], cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
-            env=os.environ | {"LD_PRELOAD": str(library()), "PYTHONPATH": str(ROOT)},
-        )  # fmt: skip
-
-    def run(self, arguments: list[object], env: dict[str, str], said: Path, kill_after: float) -> int:
-        """Run a command in a session of its own; returns its exit status, negative for a signal."""
-        print(json.dumps([[*map(str, arguments)], env, str(said)]), file=self._process.stdin, flush=True)
-        session = int(self._process.stdout.readline())
-        if kill_after >= 0:
-            # The server reaps it when it is asked to go on: until then its number is nobody else's.
-            time.sleep(kill_after)
-            with contextlib.suppress(ProcessLookupError):
-                os.killpg(session, signal.SIGKILL)
-        print(file=self._process.stdin, flush=True)
-        code = int(self._process.stdout.readline())
-        chores.until_empty(session)
-        return code
-
-    def close(self) -> None:
-        """End it."""
-        self._process.stdin.close()
-        self._process.wait()
-
-
-def serve() -> None:
-    """Be a `Server`'s process."""
-    for name in (
-        "aerialdojo_gen.pipeline.stages.work.render",
-        "aerialdojo_gen.pipeline.stages.work.plan",
-        "aerialdojo_gen.pipeline.stages.work.anchor_sample",
-        "aerialdojo_gen.benchmark.runner",
-        "aerialdojo_gen.exchange.exporting",
-        "aerialdojo_gen.exchange.importing",
-        "pandas",  # PyArrow does, as soon as it is given a list
-        "pyarrow.dataset",
-        "scipy.spatial",
-    ):
-        importlib.import_module(name)
-    # What takes seconds the first time, a child has from here: Numba, all props, which sources a stage imports.
-    importlib.import_module("aerialdojo_gen.geometry.portable").exp([0.0])
-    importlib.import_module("aerialdojo_gen.scenes.catalogue").load_catalogue(ROOT / "scene_assets")
-    runner = importlib.import_module("aerialdojo_gen.pipeline.runner")
-    for stage in runner.STAGES:
-        runner.stage_code(stage.name)
-    cli = importlib.import_module("aerialdojo_gen.cli.app")
-    for line in iter(sys.stdin.readline, ""):
-        arguments, env, said = json.loads(line)
-        child = os.fork()
-        if not child:
-            os.setsid()
-            os.environ.update(env)
-            output = os.open(said, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
-            for number in (1, 2):
-                os.dup2(output, number)
-            os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
-            sys.argv[:] = ["aerialdojo-gen", *arguments]
-            try:
-                cli.main()
-                code = 0
-            except SystemExit as error:
-                code = error.code if isinstance(error.code, int) else bool(error.code)
-            except BaseException:
-                traceback.print_exc()
-                code = 70
-            sys.stderr.flush()
-            os._exit(code)
-        print(child, flush=True)
-        sys.stdin.readline()
-        print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
+# What the server of the commands imports; what takes seconds the first time, a child has from here: Numba, all props,
+# which sources a stage imports.
+IMPORTS = f"""
+import importlib
+from pathlib import Path
+for name in (
+    "aerialdojo_gen.pipeline.stages.work.render", "aerialdojo_gen.pipeline.stages.work.plan",
+    "aerialdojo_gen.pipeline.stages.work.anchor_sample", "aerialdojo_gen.benchmark.runner",
+    "aerialdojo_gen.exchange.exporting", "aerialdojo_gen.exchange.importing", "aerialdojo_gen.cli.app",
+    "pandas",  # PyArrow does, as soon as it is given a list
+    "pyarrow.dataset", "scipy.spatial",
+):
+    importlib.import_module(name)
+from aerialdojo_gen.geometry import portable
+from aerialdojo_gen.pipeline import runner
+from aerialdojo_gen.scenes.catalogue import load_catalogue
+portable.exp([0.0])
+load_catalogue(Path({str(ROOT / "scene_assets")!r}))
+for stage in runner.STAGES:
+    runner.stage_code(stage.name)
+"""
+COMMAND = "from aerialdojo_gen.cli import app; app.main()"
 
 
 class Bench:
@@ -199,7 +141,7 @@ class Bench:
         text = (ROOT / "pipelines" / "smoke.toml").read_text(encoding="utf-8").replace('"../', f'"{ROOT}/')
         (folder / "torture.toml").write_text(text + SMALL, encoding="utf-8")
         self._base = base
-        self.server = Server()
+        self.server = ForkServer(IMPORTS, COMMAND)
         self._whole: dict[str, dict[str, bytes]] = {}
         self._seconds: dict[str, float] = {}
         self._calls: dict[str, int] = {}
@@ -306,11 +248,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--kind", action="append", choices=KINDS, help="these alone, repeatable")
     parser.add_argument("--base", type=Path, help="a finished run of pipelines/smoke.toml; made where absent")
-    parser.add_argument("--serve", action="store_true", help=argparse.SUPPRESS)
     asked = parser.parse_args()
-    if asked.serve:
-        serve()
-        return
     kinds = asked.kind or list(KINDS)
     with tempfile.TemporaryDirectory(prefix="aerialdojo-torture-") as folder:
         base: Path | None = asked.base

@@ -14,19 +14,7 @@ from typer.core import TyperGroup
 
 from aerialdojo_gen.base import cli_context, environment_errors, memory, terminal
 from aerialdojo_gen.base.errors import AerialDojoError
-from aerialdojo_gen.cli import (
-    config,
-    evaluate,
-    exchange,
-    leaderboard,
-    places,
-    release,
-    render,
-    report,
-    sources,
-    stages,
-    validate,
-)
+from aerialdojo_gen.cli import evaluate, exchange, places, release, render, report, sources, stages, validate
 
 _HEADINGS = {
     "Look at a dataset": ("stats", "show", "view", "gallery", "validate"),
@@ -91,12 +79,10 @@ def _program(
     """Accept options before the command."""
 
 
-_GROUPS = (
-    stages, render, sources, places, evaluate, release, validate, exchange, report, leaderboard
-)  # fmt: skip
+_GROUPS = (stages, render, sources, places, evaluate, release, validate, exchange, report)
 for _group in _GROUPS:
     app.add_typer(_group.app)
-app.add_typer(config.app, name="config", cls=_Commands)
+app.add_typer(stages.config_app, name="config", cls=_Commands)
 
 
 def _app_for(named: list[str]) -> typer.Typer:
@@ -142,17 +128,12 @@ def _run() -> tuple[int, str]:
     except _BadOption as error:
         where = f"; see {error.ctx.command_path} --help" if error.ctx else ""
         return error.exit_code, f"{error.format_message().rstrip('.')}{where}"
-    except AerialDojoError as error:
-        return error.exit_code, _with_notes(str(error), error)
     except Exception as error:
-        message = environment_errors.environment_error(error)
+        ours = isinstance(error, AerialDojoError)
+        message = str(error) if ours else environment_errors.environment_error(error)
         if message is None:
             raise
-        return 1, _with_notes(message, error)
-
-
-def _with_notes(message: str, error: Exception) -> str:
-    return "\n".join([message, *getattr(error, "__notes__", ())])
+        return getattr(error, "exit_code", 1), "\n".join([message, *getattr(error, "__notes__", ())])
 
 
 if __name__ == "__main__":

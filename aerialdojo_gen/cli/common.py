@@ -5,28 +5,31 @@ Nothing heavy is imported before a command runs, so that ``--help`` answers at o
 
 from __future__ import annotations
 
+import inspect
 import json
 import math
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+import typer
+
+from aerialdojo_gen.base import cli_context
 from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.base.secrets import Secrets
-from aerialdojo_gen.dataset.build import default_workers, open_pipeline, pipeline_file, run_stages
-from aerialdojo_gen.store.root import Where
+from aerialdojo_gen.cli import options
+from aerialdojo_gen.dataset.build import open_pipeline, run_stages
+from aerialdojo_gen.pipeline.registry import BY_NAME
 
 if TYPE_CHECKING:
     from aerialdojo_gen.base.config.pipeline import Pipeline
     from aerialdojo_gen.benchmark.tasks import Selection
-    from aerialdojo_gen.pipeline.options import RunOptions
+    from aerialdojo_gen.pipeline.options import RunLimits, RunOptions
     from aerialdojo_gen.pipeline.stage import ProjectPaths, Stage
     from aerialdojo_gen.scenes.model import Scene
-
-__all__ = ["default_workers", "open_pipeline", "pipeline_file", "run_chosen", "run_until"]
 
 
 def print_json(value: object) -> None:
@@ -73,26 +76,58 @@ def interruptible(left: str) -> Iterator[None]:
         raise SystemExit(130) from None
 
 
-def run_until(
-    stage: str,
-    *,
-    data: Where,
-    scene: list[str] | None = None,
-    pipeline: Path | None = None,
-    options: RunOptions,
-    force: bool = False,
-    quiet: bool = False,
-    verbose: bool = False,
-    **overrides: object,
-) -> None:
-    """Bring a stage's tables up to date, running what it needs upstream; the twin of a stage's command."""
-    from aerialdojo_gen.base.config.pipeline import with_overrides
-    from aerialdojo_gen.pipeline.registry import upstream
+@dataclass(frozen=True)
+class StageOptions:
+    """The options that the command of every stage has."""
 
-    config, roots = open_pipeline(pipeline, data)
-    config = with_overrides(config, stage, **overrides)
-    options = replace(options, force=frozenset({stage} if force else ()))
-    run_chosen(list(upstream(stage)), config, roots, scene, options, quiet, verbose)
+    scenes: options.Scenes = None
+    data: options.Data = "data"
+    scene: options.Scene = None
+    pipeline: options.PipelineFile = None
+    workers: options.Workers = None
+    force: options.Force = False
+    quiet: options.Quiet = False
+    verbose: options.Verbose = False
+    executor: options.ExecutorName = "local"
+    address: options.Address = None
+
+    @property
+    def chosen(self) -> list[str] | None:
+        """The scenes that are named, by position or by option."""
+        return merge_scenes(self.scenes, self.scene)
+
+    def run_until(
+        self, stage: str, *, scenes: list[str] | None = None, replace: bool = False, limits: RunLimits | None = None,
+        **overrides: object,
+    ) -> None:  # fmt: skip
+        """Bring a stage's tables up to date, running what it needs upstream, with other values of its section."""
+        from aerialdojo_gen.base.config.pipeline import with_overrides
+        from aerialdojo_gen.pipeline.options import RunOptions
+        from aerialdojo_gen.pipeline.registry import upstream
+
+        config, roots = open_pipeline(self.pipeline, self.data)
+        config = with_overrides(config, stage, **overrides)
+        forced = frozenset({stage} if self.force else ())
+        how = RunOptions(self.workers, self.executor, self.address, forced, replace, limits)
+        run_chosen(list(upstream(stage)), config, roots, scenes or self.chosen, how, self.quiet, self.verbose)
+
+
+def stage_command(app: typer.Typer, stage: str) -> Callable[[Callable[..., None]], None]:
+    """Register a function as a stage's command, which gets `StageOptions` and options of its own."""
+
+    def register(function: Callable[..., None]) -> None:
+        common = [*inspect.signature(StageOptions, eval_str=True).parameters.values()]
+        own = [*inspect.signature(function, eval_str=True).parameters.values()][1:]
+
+        def command(**given: Any) -> None:
+            values = {one.name: given.pop(one.name) for one in own}
+            function(StageOptions(**given), **values)
+
+        # What Typer reads the options from.
+        vars(command)["__signature__"] = inspect.Signature([*common[:-2], *own, *common[-2:]])
+        app.command(stage, help=BY_NAME[stage].help)(command)
+
+    return register
 
 
 def run_chosen(
@@ -119,6 +154,13 @@ def run_chosen(
         if not isinstance(error, UsageError):
             error.add_note(kept)
         raise
+
+
+def print_next(scene: str | None, pipeline: Path, project: Path) -> None:
+    """Say the commands that make tasks in scenes that were added; of one without annotations, first their draft."""
+    if scene is not None:
+        print(f"next: {cli_context.command('annotate-draft', scene, pipeline=pipeline)}")
+    print(f"then: {cli_context.command('run', pipeline, data=project / 'data')}")
 
 
 def print_scene(scene: Scene, notes: Sequence[str]) -> None:

@@ -17,15 +17,9 @@ from aerialdojo_gen.base import cli_context
 from aerialdojo_gen.base.cli_context import command
 from aerialdojo_gen.base.errors import AerialDojoError, UsageError
 from aerialdojo_gen.base.secrets import Secrets
-from aerialdojo_gen.cli import completion, options
-from aerialdojo_gen.cli.common import (
-    default_workers,
-    interruptible,
-    key_values,
-    merge_scenes,
-    open_pipeline,
-    selection,
-)
+from aerialdojo_gen.cli import options
+from aerialdojo_gen.cli.common import interruptible, key_values, merge_scenes, selection
+from aerialdojo_gen.dataset.build import default_workers, open_pipeline
 
 if TYPE_CHECKING:
     from aerialdojo_gen.benchmark.agents.goal import Sensors
@@ -35,82 +29,25 @@ if TYPE_CHECKING:
 app = typer.Typer()
 
 
-Agent = Annotated[
-    str | None,
-    typer.Option(
-        "--agent",
-        autocompletion=completion.agents,
-        help="oracle, random, stop, explorer, policy, …, or package.module:Class.  (default: random)",
-    ),
-]
-Preset = Annotated[
-    str | None, typer.Option("--preset", help="A preset language model instead of --agent: qwen3-vl-4b, …")
-]
-AgentOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--option", help="Option of the agent, repeatable: --option seed=1; converted to the type of its default."
-    ),
-]
-Run = Annotated[str | None, typer.Option("--run", help="Name of the run.  (default: that of the agent or preset)")]
-View = Annotated[
-    list[str] | None, typer.Option("--view", help="front, left, right, down; repeatable; overrides the agent's.")
-]
-Width = Annotated[
-    int | None, typer.Option("--width", min=1, max=4096, help="Image width in pixels; overrides the agent's.")
-]
-Height = Annotated[
-    int | None, typer.Option("--height", min=1, max=4096, help="Image height in pixels; overrides the agent's.")
-]
-Attempts = Annotated[
-    int,
-    typer.Option(
-        "--attempts",
-        min=1,
-        max=1000,
-        help="Maximum attempts per episode if something other than the agent fails.",
-    ),
-]
-RerunFailed = Annotated[
-    bool,
-    typer.Option("--rerun-failed", help="Run only those episodes again that failed for reasons outside the agent."),
-]
-Tolerate = Annotated[
-    bool,
-    typer.Option(
-        "--tolerate", help="Continue when the agent raises or returns no valid action; the episode counts as failed."
-    ),
-]
-Traceback = Annotated[bool, typer.Option("--traceback", help="Print the whole traceback of an agent that raises.")]
-Restart = Annotated[bool, typer.Option("--restart", help="Delete what the run has written before.")]
-Estimate = Annotated[
-    bool,
-    typer.Option("--estimate", help="Estimate time and cost of a language model with a few requests; fly nothing."),
-]
-MaxCost = Annotated[
-    float | None, typer.Option("--max-cost", min=0, help="Start no further episode after this cost, US dollars.")
-]
-MaxTokens = Annotated[
-    int | None, typer.Option("--max-tokens", min=0, help="Start no further episode after this number of tokens.")
-]
-RequestsPerMinute = Annotated[
-    float | None,
-    typer.Option("--requests-per-minute", min=0.001, help="Maximum request rate of all workers together."),
-]
-FailuresInRow = Annotated[
-    int,
-    typer.Option("--failures-in-row", min=1, help="Stop after this many failed episodes of one kind in a row."),
-]
-
-
 @app.command("evaluate")
 def evaluate(
     scenes: options.Scenes = None,
     data: options.Data = "data",
-    agent: Agent = None,
-    preset: Preset = None,
-    option: AgentOption = None,
-    run: Run = None,
+    agent: Annotated[
+        str | None,
+        typer.Option(
+            autocompletion=options.complete_agents,
+            help="oracle, random, stop, explorer, policy, …, or package.module:Class.  (default: random)",
+        ),
+    ] = None,
+    preset: Annotated[
+        str | None, typer.Option(help="A preset language model instead of --agent: qwen3-vl-4b, …")
+    ] = None,
+    option: Annotated[
+        list[str] | None,
+        typer.Option(help="Option of the agent, repeatable: --option seed=1; converted to the type of its default."),
+    ] = None,
+    run: Annotated[str | None, typer.Option(help="Name of the run.  (default: that of the agent or preset)")] = None,
     split: options.Split = None,
     setting: options.Setting = None,
     modality: options.Modality = None,
@@ -118,23 +55,58 @@ def evaluate(
     scene: options.Scene = None,
     limit: options.TaskLimit = None,
     seed: options.SelectionSeed = 0,
-    view: View = None,
-    width: Width = None,
-    height: Height = None,
+    view: Annotated[
+        list[str] | None, typer.Option(help="front, left, right, down; repeatable; overrides the agent's.")
+    ] = None,
+    width: Annotated[
+        int | None, typer.Option(min=1, max=4096, help="Image width in pixels; overrides the agent's.")
+    ] = None,
+    height: Annotated[
+        int | None, typer.Option(min=1, max=4096, help="Image height in pixels; overrides the agent's.")
+    ] = None,
     renderer: options.RendererName = "auto",
     tell: options.Hints = None,
     out: options.Out = None,
     submission: options.SubmissionFile = None,
-    attempts: Attempts = 5,
-    rerun_failed: RerunFailed = False,
-    tolerate: Tolerate = False,
-    traceback: Traceback = False,
-    restart: Restart = False,
-    estimate: Estimate = False,
-    max_cost: MaxCost = None,
-    max_tokens: MaxTokens = None,
-    requests_per_minute: RequestsPerMinute = None,
-    failures_in_row: FailuresInRow = 5,
+    attempts: Annotated[
+        int,
+        typer.Option(min=1, max=1000, help="Maximum attempts per episode if something other than the agent fails."),
+    ] = 5,
+    rerun_failed: Annotated[
+        bool,
+        typer.Option(
+            "--rerun-failed", help="Run only those episodes again that failed for reasons outside the agent."
+        ),
+    ] = False,
+    tolerate: Annotated[
+        bool,
+        typer.Option(
+            "--tolerate",
+            help="Continue when the agent raises or returns no valid action; the episode counts as failed.",
+        ),
+    ] = False,
+    traceback: Annotated[
+        bool, typer.Option("--traceback", help="Print the whole traceback of an agent that raises.")
+    ] = False,
+    restart: Annotated[bool, typer.Option("--restart", help="Delete what the run has written before.")] = False,
+    estimate: Annotated[
+        bool,
+        typer.Option(
+            "--estimate", help="Estimate time and cost of a language model with a few requests; fly nothing."
+        ),
+    ] = False,
+    max_cost: Annotated[
+        float | None, typer.Option(min=0, help="Start no further episode after this cost, US dollars.")
+    ] = None,
+    max_tokens: Annotated[
+        int | None, typer.Option(min=0, help="Start no further episode after this number of tokens.")
+    ] = None,
+    requests_per_minute: Annotated[
+        float | None, typer.Option(min=0.001, help="Maximum request rate of all workers together.")
+    ] = None,
+    failures_in_row: Annotated[
+        int, typer.Option(min=1, help="Stop after this many failed episodes of one kind in a row.")
+    ] = 5,
     workers: options.Workers = None,
     executor: options.ExecutorName = "local",
     address: options.Address = None,
@@ -215,10 +187,10 @@ def _agent(agent: str | None, preset: str | None, given: dict[str, str]) -> tupl
         return agent or "random", read_options(agent or "random", given)
     from aerialdojo_gen.benchmark.llm.options import preset as find
 
-    found = find(preset)
-    if agent is not None and agent != found.agent:
-        raise UsageError(f"preset {preset!r} is of the agent {found.agent!r}: leave --agent {agent} out")
-    return found.agent, found.options | read_options(found.agent, given)
+    model = find(preset)
+    if agent is not None and agent != model.agent:
+        raise UsageError(f"preset {preset!r} is of the agent {model.agent!r}: leave --agent {agent} out")
+    return model.agent, model.options | read_options(model.agent, given)
 
 
 def _sensors(
@@ -234,18 +206,14 @@ def _sensors(
 
     own = getattr(load_agent(agent, **options), "sensors", None)
     sensors = own if isinstance(own, Sensors) else Sensors()
-    return replace(
-        sensors,
-        views=sensors.views if view is None else tuple(view),
-        width=width or sensors.width,
-        height=height or sensors.height,
-    )
+    views = sensors.views if view is None else tuple(view)
+    return replace(sensors, views=views, width=width or sensors.width, height=height or sensors.height)
 
 
 def rerun_command(more: Sequence[str], *, without: Sequence[str] = (), data: str | None = None) -> str:
     """Return this process's command with all its options, quoted for a shell."""
     kept = [argument for argument in sys.argv[1:] if argument not in without]
-    named = any(argument == "--data" or argument.startswith("--data=") for argument in kept)
+    named = any(argument.partition("=")[0] == "--data" for argument in kept)
     if data is not None and os.environ.get("AERIALDOJO_DATA") and not named:
         kept += ["--data", data]
     kept += [argument for argument in more if argument not in kept]
@@ -257,12 +225,11 @@ def rerun_command(more: Sequence[str], *, without: Sequence[str] = (), data: str
 @app.command("fly")
 def fly(
     name: Annotated[
-        str,
-        typer.Option("--name", help="The pilot's name in the tables: small letters, digits and -; any name does."),
+        str, typer.Option(help="The pilot's name in the tables: small letters, digits and -; any name does.")
     ],
     scenes: options.Scenes = None,
     data: options.Data = "data",
-    run: Annotated[str | None, typer.Option("--run", help="Name of the run.  (default: human-NAME)")] = None,
+    run: Annotated[str | None, typer.Option(help="Name of the run.  (default: human-NAME)")] = None,
     split: options.Split = None,
     setting: options.Setting = None,
     modality: options.Modality = None,
@@ -314,26 +281,21 @@ def train(
     ] = False,
     out: Annotated[
         Path | None,
-        typer.Option(
-            "--out", metavar="DIR", help="Folder for weights and checkpoints.  (default: policies/NAME in --data)"
-        ),
+        typer.Option(metavar="DIR", help="Folder for weights and checkpoints.  (default: policies/NAME in --data)"),
     ] = None,
     cache: Annotated[
         Path | None,
-        typer.Option(
-            "--cache", metavar="DIR", help="Cache for rendered images.  (default: policies/cache in --data)"
-        ),
+        typer.Option(metavar="DIR", help="Cache for rendered images.  (default: policies/cache in --data)"),
     ] = None,
     init: Annotated[
         Path | None,
         typer.Option(
-            "--init",
             metavar="WEIGHTS",
             help="Begin with the weights of another training, to adapt them to the "
             "recipe's scenes.  (default: random weights)",
         ),
     ] = None,
-    device: Annotated[str, typer.Option("--device", help="auto, cpu or cuda.")] = "auto",
+    device: Annotated[str, typer.Option(help="auto, cpu or cuda.")] = "auto",
     renderer: options.RendererName = "auto",
     restart: Annotated[bool, typer.Option("--restart", help="Delete an earlier training of this name.")] = False,
     workers: options.Workers = None,

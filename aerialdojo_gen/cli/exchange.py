@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -13,115 +12,100 @@ from aerialdojo_gen.base import cli_context
 from aerialdojo_gen.base.errors import UsageError, brief
 from aerialdojo_gen.cli import options
 from aerialdojo_gen.cli.common import interruptible, merge_scenes, print_json
-from aerialdojo_gen.store.root import DataRoot, LocalRoot, open_root
+from aerialdojo_gen.cli.options import is_typed
+from aerialdojo_gen.store.root import LocalRoot, open_root
 
 app = typer.Typer()
 
 # Formats with what the body sees on its way.
-FOR_TRAINING = ("lerobot", "webdataset")
-# Formats of meshes alone.
-SHAPES = ("pointcloud", "occupancy")
-
-
-Format = Annotated[
-    str, typer.Option("--format", help="aerialdojo, habitat, lerobot, webdataset, pointcloud or occupancy.")
-]
-ExportFolder = Annotated[Path | None, typer.Option("--out", help="Folder to write.  (default: DATA/exports/FORMAT)")]
-ReplaceExport = Annotated[bool, typer.Option("--force", help="Replace an earlier export there.")]
-PictureSize = Annotated[
-    int | None,
-    typer.Option(help="aerialdojo: size of rendered pictures in pixels; 0: those of the release.  (default: 640)"),
-]
-Shards = Annotated[
-    bool, typer.Option("--shards", help="aerialdojo: one tar file per scene instead of one file per trajectory.")
-]
-ExportSplit = Annotated[
-    list[str] | None,
-    typer.Option("--split", help="id_train, id_test, ood_train, ood_test, train, test; repeatable.  (default: all)"),
-]
-ExportLimit = Annotated[
-    int | None,
-    typer.Option(
-        "--limit",
-        min=0,
-        help="Maximum number of trajectories per scene and setting, not in total.  (default: 0, all)",
+_FOR_TRAINING = ("lerobot", "webdataset")
+# Options that some formats alone have.
+_FORMATS_OF = {
+    **dict.fromkeys(("picture_size", "shards"), ("aerialdojo",)),
+    **dict.fromkeys(
+        ("split", "setting", "limit", "seed", "view", "width", "height", "no_depth", "goal", "source", "renderer",
+         "jpeg_quality", "run", "workers", "estimate"), _FOR_TRAINING,
     ),
-]
-ExportSeed = Annotated[
-    int | None,
-    typer.Option("--seed", min=0, help="Seed for the selection of trajectories by --limit.  (default: 0)"),
-]
-ExportView = Annotated[
-    list[str] | None, typer.Option("--view", help="front, left, right, down; repeatable.  (default: front)")
-]
-ExportWidth = Annotated[
-    int | None, typer.Option("--width", min=16, max=4096, help="Image width in pixels.  (default: 128)")
-]
-ExportHeight = Annotated[
-    int | None, typer.Option("--height", min=16, max=4096, help="Image height in pixels.  (default: the width)")
-]
-NoDepth = Annotated[bool, typer.Option("--no-depth", help="Export colour images without depth.")]
-GoalKind = Annotated[list[str] | None, typer.Option("--goal", help="text, image; repeatable.  (default: text)")]
-Source = Annotated[
-    str | None,
-    typer.Option(
-        "--source",
-        help="render: render now; recordings: read those of the command render; auto: read where there are.  "
-        "(default: render)",
-    ),
-]
-ExportRenderer = Annotated[str | None, typer.Option("--renderer", help="auto, gl or pybullet.  (default: auto)")]
-JpegQuality = Annotated[
-    int | None,
-    typer.Option("--jpeg-quality", min=1, max=100, help="webdataset: JPEG quality, instead of lossless PNG."),
-]
-FlownRun = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--run",
-        help="Export the successful flights of this run of evaluate or fly in place of the references; repeatable.",
-    ),
-]
-PointsPerM2 = Annotated[
-    float | None,
-    typer.Option("--points-per-m2", help="pointcloud: points per square metre of surface.  (default: 20)"),
-]
-VoxelM = Annotated[
-    float | None, typer.Option("--voxel-m", help="occupancy: edge of a voxel in metres.  (default: 0.5)")
-]
-EstimateExport = Annotated[
-    bool,
-    typer.Option("--estimate", help="Measure a few trajectories and estimate time and size for all; write nothing."),
-]
+    "points_per_m2": ("pointcloud",), "voxel_m": ("occupancy",),
+}  # fmt: skip
 
 
 @app.command("export")
 def export(
-    form: Format,
+    ctx: typer.Context,
+    form: Annotated[
+        str, typer.Option("--format", help="aerialdojo, habitat, lerobot, webdataset, pointcloud or occupancy.")
+    ],
     scenes: options.Scenes = None,
     data: options.Data = "data",
-    out: ExportFolder = None,
+    out: Annotated[Path | None, typer.Option(help="Folder to write.  (default: DATA/exports/FORMAT)")] = None,
     scene: options.Scene = None,
-    force: ReplaceExport = False,
-    picture_size: PictureSize = None,
-    shards: Shards = False,
-    split: ExportSplit = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace an earlier export there.")] = False,
+    picture_size: Annotated[
+        int | None,
+        typer.Option(
+            help="aerialdojo: size of rendered pictures in pixels; 0: those of the release.  (default: 640)"
+        ),
+    ] = None,
+    shards: Annotated[
+        bool, typer.Option("--shards", help="aerialdojo: one tar file per scene instead of one file per trajectory.")
+    ] = False,
+    split: Annotated[
+        list[str] | None,
+        typer.Option(help="id_train, id_test, ood_train, ood_test, train, test; repeatable.  (default: all)"),
+    ] = None,
     setting: options.Setting = None,
-    limit: ExportLimit = None,
-    seed: ExportSeed = None,
-    view: ExportView = None,
-    width: ExportWidth = None,
-    height: ExportHeight = None,
-    no_depth: NoDepth = False,
-    goal: GoalKind = None,
-    source: Source = None,
-    renderer: ExportRenderer = None,
-    jpeg_quality: JpegQuality = None,
-    run: FlownRun = None,
+    limit: Annotated[
+        int | None,
+        typer.Option(
+            min=0, help="Maximum number of trajectories per scene and setting, not in total.  (default: 0, all)"
+        ),
+    ] = None,
+    seed: Annotated[
+        int | None, typer.Option(min=0, help="Seed for the selection of trajectories by --limit.  (default: 0)")
+    ] = None,
+    view: Annotated[
+        list[str] | None, typer.Option(help="front, left, right, down; repeatable.  (default: front)")
+    ] = None,
+    width: Annotated[
+        int | None, typer.Option(min=16, max=4096, help="Image width in pixels.  (default: 128)")
+    ] = None,
+    height: Annotated[
+        int | None, typer.Option(min=16, max=4096, help="Image height in pixels.  (default: the width)")
+    ] = None,
+    no_depth: Annotated[bool, typer.Option("--no-depth", help="Export colour images without depth.")] = False,
+    goal: Annotated[list[str] | None, typer.Option(help="text, image; repeatable.  (default: text)")] = None,
+    source: Annotated[
+        str | None,
+        typer.Option(
+            help="render: render now; recordings: read those of the command render; auto: read where there are.  "
+            "(default: render)"
+        ),
+    ] = None,
+    renderer: Annotated[str | None, typer.Option(help="auto, gl or pybullet.  (default: auto)")] = None,
+    jpeg_quality: Annotated[
+        int | None, typer.Option(min=1, max=100, help="webdataset: JPEG quality, instead of lossless PNG.")
+    ] = None,
+    run: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Export the successful flights of this run of evaluate or fly in place of the references; "
+            "repeatable."
+        ),
+    ] = None,
     workers: options.Workers = None,
-    points_per_m2: PointsPerM2 = None,
-    voxel_m: VoxelM = None,
-    estimate: EstimateExport = False,
+    points_per_m2: Annotated[
+        float | None, typer.Option(help="pointcloud: points per square metre of surface.  (default: 20)")
+    ] = None,
+    voxel_m: Annotated[
+        float | None, typer.Option(help="occupancy: edge of a voxel in metres.  (default: 0.5)")
+    ] = None,
+    estimate: Annotated[
+        bool,
+        typer.Option(
+            "--estimate", help="Measure a few trajectories and estimate time and size for all; write nothing."
+        ),
+    ] = False,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
@@ -132,100 +116,73 @@ def export(
     pointcloud (PLY) and occupancy (NumPy's npz) are of all scenes whose meshes are there, and need no release.
     """
     from aerialdojo_gen.base.names import unknown
-    from aerialdojo_gen.exchange import exporting
+    from aerialdojo_gen.exchange.exporting import (
+        FORMATS,
+        POINTS_PER_M2,
+        SHAPES,
+        VOXEL_M,
+        export_release,
+        export_shapes,
+    )
     from aerialdojo_gen.pipeline.progress import Reporter
 
-    training = {
-        "splits": split, "settings": setting, "limit": limit, "seed": seed, "views": view, "goal": goal,
-        "source": source, "renderer": renderer, "jpeg_quality": jpeg_quality, "runs": run,
-        "depth": False if no_depth else None,
-        "size": (width or height or 128, height or width or 128) if width or height else None,
-    }  # fmt: skip
-    given = {name: value for name, value in training.items() if value is not None and value != []}
-    if form not in (known := (*exporting.FORMATS, *FOR_TRAINING, *SHAPES)):
+    if form not in (known := (*FORMATS, *_FOR_TRAINING, *SHAPES)):
         raise UsageError(unknown("no format", form, known))
-    _check_fits(form, FOR_TRAINING, {
-        **{_WRITTEN.get(name, f"--{name}"): value for name, value in given.items()},
-        "--estimate": estimate or None, "--workers": workers,
-    })  # fmt: skip
-    _check_fits(form, ("aerialdojo",), {"--picture-size": picture_size, "--shards": shards or None})
-    _check_fits(form, SHAPES[:1], {"--points-per-m2": points_per_m2})
-    _check_fits(form, SHAPES[1:], {"--voxel-m": voxel_m})
+    _check_fits(ctx, form)
     root, chosen = open_root(data), merge_scenes(scenes, scene)
     if out is None and not isinstance(root, LocalRoot):
         raise UsageError("an export is a folder of this machine: name it with --out")
     target = out or Path(root.at(f"exports/{form}"))
-    if form in FOR_TRAINING:
-        _for_training(form, root, target, {**given, "scenes": chosen or ()}, force, workers, estimate, as_json, quiet)
-        return
-    reporter = Reporter(quiet=quiet or as_json)
-    if form in SHAPES:
-        counts = exporting.export_shapes(
-            form, root, target, chosen, force=force, reporter=reporter,
-            points_per_m2=exporting.POINTS_PER_M2 if points_per_m2 is None else points_per_m2,
-            voxel_m=exporting.VOXEL_M if voxel_m is None else voxel_m,
+    if form in _FOR_TRAINING:
+        from aerialdojo_gen.benchmark.agents.goal import Sensors
+        from aerialdojo_gen.exchange.learning_export import estimate_for_learning, export_for_learning
+        from aerialdojo_gen.exchange.samples import ExportOptions
+
+        sensors = Sensors(
+            tuple(view or ("front",)), True, not no_depth, width or height or 128, height or width or 128
+        )
+        request = ExportOptions(
+            tuple(split or ()), tuple(setting or ()), tuple(chosen or ()), limit or 0, seed or 0, sensors,
+            tuple(goal or ("text",)), source or "render", renderer or "auto", jpeg_quality or 0, tuple(run or ()),
+        )  # fmt: skip
+        if estimate:
+            estimated = estimate_for_learning(form, root, request, workers)
+            if as_json:
+                print_json(asdict(estimated))
+            else:
+                print(estimated)
+            return
+        with interruptible("finished parts are kept, the same command continues from here"):
+            made = export_for_learning(
+                form, root, target, request, force=force, workers=workers, reporter=Reporter(quiet=quiet)
+            )
+        counts, document = made.counts, asdict(made)
+    elif form in SHAPES:
+        counts = document = export_shapes(
+            form, root, target, chosen, force=force, reporter=Reporter(quiet=quiet or as_json),
+            points_per_m2=POINTS_PER_M2 if points_per_m2 is None else points_per_m2,
+            voxel_m=VOXEL_M if voxel_m is None else voxel_m,
         )  # fmt: skip
     else:
-        counts = exporting.export_release(
-            form, root, target, chosen, force=force, picture_px=picture_size, shards=shards, reporter=reporter
-        )
-    _print_export(target, counts, {}, as_json, quiet)
-
-
-# Options by what they set, where two dashes before the name do not do.
-_WRITTEN = {
-    "splits": "--split", "settings": "--setting", "runs": "--run", "views": "--view", "size": "--width",
-    "depth": "--no-depth", "jpeg_quality": "--jpeg-quality",
-}  # fmt: skip
-
-
-def _check_fits(form: str, formats: Sequence[str], given: dict[str, object]) -> None:
-    """Refuse options of other formats; None is what was not given."""
-    names = [name for name, value in given.items() if value is not None]
-    if names and form not in formats:
-        verb = "is" if len(names) == 1 else "are"
-        raise UsageError(f"{', '.join(names)} {verb} for --format {' and '.join(formats)}, not for {form}")
-
-
-def _print_export(target: Path, counts: dict[str, int], more: dict[str, Any], as_json: bool, quiet: bool) -> None:
+        counts = document = export_release(
+            form, root, target, chosen, force=force, picture_px=picture_size, shards=shards,
+            reporter=Reporter(quiet=quiet or as_json),
+        )  # fmt: skip
     if as_json:
-        print_json({"path": str(target), **(more or counts)})
+        print_json({"path": str(target), **document})
     elif not quiet:
         print(f"{target}: " + ", ".join(f"{n:,} {name}" for name, n in counts.items()))
 
 
-def _for_training(
-    form: str,
-    root: DataRoot,
-    target: Path,
-    chosen: dict[str, Any],
-    force: bool,
-    workers: int | None,
-    estimate: bool,
-    as_json: bool,
-    quiet: bool,
-) -> None:
-    from aerialdojo_gen.benchmark.agents.goal import Sensors
-    from aerialdojo_gen.exchange.learning_export import estimate_for_learning, export_for_learning
-    from aerialdojo_gen.exchange.samples import ExportOptions
-    from aerialdojo_gen.pipeline.progress import Reporter
-
-    width, height = chosen.pop("size", (128, 128))
-    sensors = Sensors(tuple(chosen.pop("views", ("front",))), True, chosen.pop("depth", True), width, height)
-    lists = {name: tuple(value) for name, value in chosen.items() if isinstance(value, list)}
-    request = ExportOptions(sensors=sensors, **{**chosen, **lists})
-    if estimate:
-        estimated = estimate_for_learning(form, root, request, workers)
-        if as_json:
-            print_json(asdict(estimated))
-        else:
-            print(estimated)
-        return
-    with interruptible("finished parts are kept, the same command continues from here"):
-        made = export_for_learning(
-            form, root, target, request, force=force, workers=workers, reporter=Reporter(quiet=quiet)
-        )
-    _print_export(target, made.counts, asdict(made), as_json, quiet)
+def _check_fits(ctx: typer.Context, form: str) -> None:
+    """Refuse options of other formats."""
+    given: dict[tuple[str, ...], list[str]] = {}
+    for option in ctx.command.params:
+        if is_typed(ctx, option) and form not in (formats := _FORMATS_OF.get(str(option.name), (form,))):
+            given.setdefault(formats, []).append(option.opts[0])
+    for formats, names in given.items():
+        verb = "is" if len(names) == 1 else "are"
+        raise UsageError(f"{', '.join(names)} {verb} for --format {' and '.join(formats)}, not for {form}")
 
 
 @app.command("import-benchmark")
@@ -234,8 +191,7 @@ def import_benchmark(
     form: Annotated[str, typer.Option("--format", help="aerialdojo, uav-on, cityavos, aerialvln or openfly.")],
     data: options.Data = "data",
     frame: Annotated[
-        str | None,
-        typer.Option(help="Axes of cityavos and openfly: enu, nwu, ned or esd (east, south, down)."),
+        str | None, typer.Option(help="Axes of cityavos and openfly: enu, nwu, ned or esd (east, south, down).")
     ] = None,
     angles: Annotated[str, typer.Option(help="Unit of yaw in cityavos: radians, degrees or mixed.")] = "radians",
     images: Annotated[
@@ -265,13 +221,11 @@ def push_to_hub(
     repo: Repo,
     data: options.Data = "data",
     private: Annotated[bool, typer.Option("--private", help="If the dataset is new, make it private.")] = False,
-    revision: Annotated[str | None, typer.Option("--revision", help="Branch to write to.  (default: main)")] = None,
+    revision: Annotated[str | None, typer.Option(help="Branch to write to.  (default: main)")] = None,
     meshes: Annotated[bool, typer.Option("--meshes", help="Upload scene meshes too; evaluate needs them.")] = False,
     policy: Annotated[
         list[str] | None,
-        typer.Option(
-            "--policy", metavar="NAME", help="Upload the weights of this training too, such as imitation; repeatable."
-        ),
+        typer.Option(metavar="NAME", help="Upload the weights of this training too, such as imitation; repeatable."),
     ] = None,
     quiet: options.Quiet = False,
 ) -> None:
@@ -290,9 +244,7 @@ def push_to_hub(
 def pull(
     repo: Repo,
     data: options.Data = "data",
-    revision: Annotated[
-        str | None, typer.Option("--revision", help="Branch, tag or commit.  (default: main)")
-    ] = None,
+    revision: Annotated[str | None, typer.Option(help="Branch, tag or commit.  (default: main)")] = None,
     meshes: Annotated[
         bool, typer.Option("--meshes/--no-meshes", help="Download the meshes too, if the dataset has them.")
     ] = True,

@@ -9,7 +9,7 @@ import typer
 
 from aerialdojo_gen.base import cli_context
 from aerialdojo_gen.cli import options
-from aerialdojo_gen.cli.common import print_scene
+from aerialdojo_gen.cli.common import print_next, print_scene
 
 if TYPE_CHECKING:
     from aerialdojo_gen.imports.places import AddedPlace
@@ -93,7 +93,7 @@ def vary(
     seeds: Annotated[
         str, typer.Option(help="FIRST:END; 0 to 199 are test worlds, 200 to 999 validation, from 1000 training.")
     ],
-    out: Annotated[Path, typer.Option("--out", help="Folder for the plans, annotations and pipeline.")],
+    out: Annotated[Path, typer.Option(help="Folder for the plans, annotations and pipeline.")],
     knob: Annotated[
         list[str] | None,
         typer.Option(metavar="NAME=VALUE", help="Set a quantity that is drawn otherwise; repeatable."),
@@ -152,6 +152,4 @@ def _box(text: str) -> tuple[float, float, float, float]:
 def _print_scenes(added: list[AddedPlace], project: Path) -> None:
     for place in added:
         print_scene(place.scene, place.notes)
-    first = added[0]
-    print(f"next: {cli_context.command('annotate-draft', first.name, pipeline=first.pipeline)}")
-    print(f"then: {cli_context.command('run', first.pipeline, data=project / 'data')}")
+    print_next(added[0].name, added[0].pipeline, project)

@@ -12,7 +12,8 @@ import typer
 from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.base.text_table import facts, terminal_width
 from aerialdojo_gen.cli import options
-from aerialdojo_gen.cli.common import json_text, merge_scenes, open_pipeline, print_json
+from aerialdojo_gen.cli.common import json_text, merge_scenes, print_json
+from aerialdojo_gen.dataset.build import open_pipeline
 from aerialdojo_gen.store.atomic import atomic_file
 from aerialdojo_gen.store.root import DataRoot, open_root
 
@@ -117,13 +118,13 @@ def show(
     from aerialdojo_gen.studio.show.figure import write_page, write_png
     from aerialdojo_gen.studio.show.pictured import picture_task
 
-    found = find_task(data, task_id)
+    record = find_task(data, task_id)
     if as_json:
         # The rows as they stand: nothing is drawn unless a file is asked for.
-        print_json(found.as_json())
+        print_json(record.as_json())
         if out is None and html is None:
             return
-    pictured = picture_task(found, "image" if task_id.endswith("-i") else "semantic", frames)
+    pictured = picture_task(record, "image" if task_id.endswith("-i") else "semantic", frames)
     stream = sys.stderr if as_json else sys.stdout
     if not as_json:
         print("\n".join([pictured.title, pictured.terminal_goal, *facts(pictured.facts, terminal_width())]))
@@ -145,9 +146,10 @@ def view(
     from aerialdojo_gen.studio.web.serving import open_socket, require_web, serve, url_of
 
     require_web()
-    from aerialdojo_gen.studio.view.server import chosen_scenes, view_app
+    from aerialdojo_gen.dataset.contents import scenes_in_release
+    from aerialdojo_gen.studio.view.server import view_app
 
-    names = chosen_scenes(data, merge_scenes(scenes, scene))
+    names = scenes_in_release(data, merge_scenes(scenes, scene))
     page = view_app(data, names)
     listener = open_socket(port)
     # One scene is shown at once; of several the start page lets one choose.

@@ -5,27 +5,23 @@ from __future__ import annotations
 import re
 import time
 from dataclasses import asdict
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.cli import options
-from aerialdojo_gen.cli.common import default_workers, merge_scenes, open_pipeline, print_json, run_until
-from aerialdojo_gen.pipeline.registry import BY_NAME
-from aerialdojo_gen.store.root import Where
+from aerialdojo_gen.cli.common import StageOptions, print_json, stage_command
+from aerialdojo_gen.dataset.build import default_workers, open_pipeline
 
 app = typer.Typer()
 
 _SECONDS = {"s": 1.0, "m": 60.0, "h": 3600.0, "d": 86400.0}
 
 
-@app.command("render", help=BY_NAME["render"].help)
+@stage_command(app, "render")
 def render(
-    scenes: options.Scenes = None, data: options.Data = "data", scene: options.Scene = None,
-    pipeline: options.PipelineFile = None, workers: options.Workers = None, force: options.Force = False,
-    quiet: options.Quiet = False, verbose: options.Verbose = False, replace: options.Replace = False,
+    common: StageOptions, replace: options.Replace = False,
     split: Annotated[str | None, typer.Option(
         "--split", help="train, test, all, id_train, id_test, ood_train or ood_test.")] = None,
     limit: Annotated[int | None, typer.Option(
@@ -56,14 +52,12 @@ def render(
         "--prune", help="Remove the recordings of trajectories that the release no longer has, and record nothing."
     )] = False,
     as_json: options.Json = False,
-    executor: options.ExecutorName = "local", address: options.Address = None,
 ) -> None:  # fmt: skip
     """Record four RGB-D views along trajectories of the release."""
-    from aerialdojo_gen.pipeline.options import RunLimits, RunOptions
+    from aerialdojo_gen.pipeline.options import RunLimits
 
-    scene = merge_scenes(scenes, scene)
     if prune:
-        _prune(data, scene)
+        _prune(common)
         return
     limits = RunLimits(
         share_of(shard) if shard else (0, 1), time.time() + duration_s(budget) if budget else None, verify
@@ -73,23 +67,19 @@ def render(
         "frames": frames, "light": light, "instances": instances or None,
     }  # fmt: skip
     if estimate:
-        _estimate(data, scene, pipeline, workers, limits.share, overrides, as_json)
+        _estimate(common, limits.share, overrides, as_json)
         return
     if as_json:
         raise UsageError("--json goes with --estimate: what was recorded stands in the tables recordings and frames")
-    chosen = _scenes_of(split, scene, pipeline, data)
-    run_until(
-        "render", data=data, scene=chosen, pipeline=pipeline, force=force, quiet=quiet, verbose=verbose,
-        options=RunOptions(workers, executor, address, replace=replace, limits=limits), **overrides,
-    )  # fmt: skip
+    common.run_until("render", scenes=_scenes_of(split, common), replace=replace, limits=limits, **overrides)
 
 
-def _prune(data: Where, scene: list[str] | None) -> None:
+def _prune(common: StageOptions) -> None:
     from aerialdojo_gen.dataset.contents import prune_recordings
 
-    if scene:
+    if common.chosen:
         raise UsageError("--prune looks at all scenes: leave the scenes out")
-    gone = prune_recordings(data)
+    gone = prune_recordings(common.data)
     print(f"{len(gone):,} recordings removed: the release does not have their trajectories")
 
 
@@ -104,40 +94,33 @@ def profile_keys(profile: str | None) -> dict[str, object]:
     return defaults | PROFILES.get(profile, {}) | {"profile": profile}
 
 
-def _scenes_of(split: str | None, scene: list[str] | None, pipeline: Path | None, data: Where) -> list[str] | None:
+def _scenes_of(split: str | None, common: StageOptions) -> list[str] | None:
     """Leave out the scenes that a split such as id_train has nothing of: their recordings stay as they are."""
     if split is None or "_" not in split:
-        return scene
+        return common.chosen
     from aerialdojo_gen.pipeline import runner
     from aerialdojo_gen.store import shards as store
 
-    config, roots = open_pipeline(pipeline, data)
-    scenes = runner.chosen_scenes(config, roots, scene)
+    config, roots = open_pipeline(common.pipeline, common.data)
+    scenes = runner.chosen_scenes(config, roots, common.chosen)
     chosen = [name for name in scenes if store.partition(name) == split.split("_")[0]]
     if not chosen:
         raise UsageError(f"--split {split} has none of the scenes {', '.join(scenes[:5])}")
     return chosen
 
 
-def _estimate(
-    data: Where,
-    scene: list[str] | None,
-    pipeline: Path | None,
-    workers: int | None,
-    share: tuple[int, int],
-    overrides: dict[str, object],
-    as_json: bool,
-) -> None:
+def _estimate(common: StageOptions, share: tuple[int, int], overrides: dict[str, object], as_json: bool) -> None:
     from aerialdojo_gen.base.config.pipeline import with_overrides
     from aerialdojo_gen.dataset.contents import scenes_in_release
     from aerialdojo_gen.pipeline import runner
     from aerialdojo_gen.rendering.estimate import estimate
 
-    config, roots = open_pipeline(pipeline, data, reads=True)
+    config, roots = open_pipeline(common.pipeline, common.data, reads=True)
     scenes_in_release(roots.data)
     config = with_overrides(config, "render", **overrides)
-    scenes = runner.chosen_scenes(config, roots, scene)
-    estimated = estimate(roots.data, scenes, config.render, config.seed, workers or default_workers(), share[1])
+    scenes = runner.chosen_scenes(config, roots, common.chosen)
+    workers = common.workers or default_workers()
+    estimated = estimate(roots.data, scenes, config.render, config.seed, workers, share[1])
     if as_json:
         print_json(asdict(estimated))
     else:

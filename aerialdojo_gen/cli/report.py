@@ -1,4 +1,4 @@
-"""The command that reports an evaluation's results."""
+"""Commands that report an evaluation's results, score submissions, and show scored runs side by side."""
 
 from __future__ import annotations
 
@@ -13,10 +13,13 @@ from typer.core import TyperCommand
 from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.base.text_table import terminal_width, wrapped
 from aerialdojo_gen.cli import options
+from aerialdojo_gen.cli.common import interruptible, selection
+from aerialdojo_gen.dataset.build import open_pipeline
 from aerialdojo_gen.store.root import open_root
 
 app = typer.Typer()
 
+_SCORED = Path("scored")
 _NUMBER = re.compile(r"\d+(\.\d+)?")
 
 
@@ -36,82 +39,61 @@ class _Command(TyperCommand):
         return super().parse_args(ctx, spread)
 
 
-Runs = Annotated[list[str] | None, typer.Argument(help="Runs of evaluate.  (default: all)")]
-Log = Annotated[
-    str | None,
-    typer.Option(
-        "--log", metavar="DIR|URL", help="Where evaluate wrote its log (--out).  (default: the data directory)"
-    ),
-]
-Profile = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--profile",
-        help="Success rule, repeatable: aerialdojo, aerialdojo-5m, uav-on, aerialvln, openfly.  "
-        "(default: the first two)",
-    ),
-]
-Tables = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--table",
-        help="Print these tables, repeatable: overall, results, partition, family, averages, setting, goal, "
-        "modality, radius, visits, difficulty, seen, conduct, type, scene, all.",
-    ),
-]
-Radius = Annotated[
-    list[float] | None,
-    typer.Option(
-        "--radius",
-        min=0.0,
-        help="Success radii in metres for the radius table: --radius 1 3 5 10.  (default: 3 5)",
-    ),
-]
-PaperResults = Annotated[
-    Literal["paper"] | None,
-    typer.Option("--beside", help="paper: add the paper's own results, from its simulator."),
-]
-Paired = Annotated[bool, typer.Option("--paired", help="Compare two runs on the tasks that both have done.")]
-Group = Annotated[
-    list[str] | None,
-    typer.Option("--group", help="Group runs under a heading, repeatable: --group open=qwen,phi --group closed=gpt."),
-]
-Intervals = Annotated[bool, typer.Option("--intervals/--no-intervals", help="Print 95 % confidence intervals.")]
-AddBaselines = Annotated[
-    bool,
-    typer.Option("--baselines/--no-baselines", help="Add stop, constant, random if they did the same tasks."),
-]
-Style = Annotated[
-    Literal["terminal", "markdown", "latex", "csv", "json"], typer.Option("--format", help="Output format.")
-]
-ByScene = Annotated[bool, typer.Option("--by-scene", help="Print the table by scene too.")]
-ReportFolder = Annotated[
-    Path | None, typer.Option("--out", help="Folder for report.html, tables, figures and metrics.csv.")
-]
-Replays = Annotated[int, typer.Option("--replays", min=0, max=50, help="Number of tasks that report.html replays.")]
-Frames = Annotated[bool, typer.Option("--frames", help="Render front views for the replays.")]
-
-
 @app.command("report", cls=_Command)
 def report(
-    runs: Runs = None,
+    runs: Annotated[list[str] | None, typer.Argument(help="Runs of evaluate.  (default: all)")] = None,
     data: options.Data = "data",
-    log: Log = None,
-    profile: Profile = None,
-    table: Tables = None,
-    radius: Radius = None,
+    log: Annotated[
+        str | None,
+        typer.Option(metavar="DIR|URL", help="Where evaluate wrote its log (--out).  (default: the data directory)"),
+    ] = None,
+    profile: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Success rule, repeatable: aerialdojo, aerialdojo-5m, uav-on, aerialvln, openfly.  "
+            "(default: the first two)"
+        ),
+    ] = None,
+    table: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Print these tables, repeatable: overall, results, partition, family, averages, setting, goal, "
+            "modality, radius, visits, difficulty, seen, conduct, type, scene, all."
+        ),
+    ] = None,
+    radius: Annotated[
+        list[float] | None,
+        typer.Option(
+            min=0.0, help="Success radii in metres for the radius table: --radius 1 3 5 10.  (default: 3 5)"
+        ),
+    ] = None,
     protocol: options.Protocol = None,
-    paper_results: PaperResults = None,
-    paired: Paired = False,
-    group: Group = None,
-    intervals: Intervals = True,
-    add_baselines: AddBaselines = True,
-    style: Style = "terminal",
+    paper_results: Annotated[
+        Literal["paper"] | None,
+        typer.Option("--beside", help="paper: add the paper's own results, from its simulator."),
+    ] = None,
+    paired: Annotated[
+        bool, typer.Option("--paired", help="Compare two runs on the tasks that both have done.")
+    ] = False,
+    group: Annotated[
+        list[str] | None,
+        typer.Option(help="Group runs under a heading, repeatable: --group open=qwen,phi --group closed=gpt."),
+    ] = None,
+    intervals: Annotated[
+        bool, typer.Option("--intervals/--no-intervals", help="Print 95 % confidence intervals.")
+    ] = True,
+    add_baselines: Annotated[
+        bool,
+        typer.Option("--baselines/--no-baselines", help="Add stop, constant, random if they did the same tasks."),
+    ] = True,
+    style: Annotated[
+        Literal["terminal", "markdown", "latex", "csv", "json"], typer.Option("--format", help="Output format.")
+    ] = "terminal",
     as_json: options.Json = False,
-    by_scene: ByScene = False,
-    out: ReportFolder = None,
-    replays: Replays = 4,
-    frames: Frames = False,
+    by_scene: Annotated[bool, typer.Option("--by-scene", help="Print the table by scene too.")] = False,
+    out: Annotated[Path | None, typer.Option(help="Folder for report.html, tables, figures and metrics.csv.")] = None,
+    replays: Annotated[int, typer.Option(min=0, max=50, help="Number of tasks that report.html replays.")] = 4,
+    frames: Annotated[bool, typer.Option("--frames", help="Render front views for the replays.")] = False,
 ) -> None:
     """Score runs of evaluate: SR, SR-view, OSR, SPL, DTS and CR as tables, figures or a page."""
     from aerialdojo_gen.base.paper_figures import results
@@ -181,3 +163,65 @@ def _groups(given: list[str]) -> dict[str, list[str]]:
             raise UsageError(f"--group {item!r}: write heading=run,run")
         groups.setdefault(heading.strip(), []).extend(name.strip() for name in names.split(","))
     return groups
+
+
+@app.command("score")
+def score(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="Submission, as evaluate --submission writes it.")],
+    data: options.Data = "data",
+    into: Annotated[Path, typer.Option(metavar="DIR", help="Folder of scored runs.")] = _SCORED,
+    name: Annotated[
+        str | None, typer.Option(help="Name of the scored run.  (default: that of the submission)")
+    ] = None,
+    split: Annotated[
+        list[str] | None,
+        typer.Option(help="Splits that must have been flown, as for evaluate; repeatable.  (default: test)"),
+    ] = None,
+    setting: options.Setting = None,
+    modality: options.Modality = None,
+    protocol: options.Protocol = None,
+    scene: options.Scene = None,
+    limit: options.TaskLimit = None,
+    seed: options.SelectionSeed = 0,
+    adapted: Annotated[
+        bool,
+        typer.Option("--adapted", help="The agent was trained on tasks of OOD scenes: list its OOD scores apart."),
+    ] = False,
+    replace: Annotated[bool, typer.Option("--replace", help="Overwrite a scored run of this name.")] = False,
+    workers: options.Workers = None,
+    pipeline: options.PipelineFile = None,
+    quiet: options.Quiet = False,
+) -> None:
+    """Replay a submission against the release, and add its scores to a folder; refuse it where it does not replay."""
+    from aerialdojo_gen.benchmark import scoring
+    from aerialdojo_gen.benchmark.metrics import MEASURES
+    from aerialdojo_gen.benchmark.tables import text
+    from aerialdojo_gen.pipeline.progress import Reporter
+
+    config, _ = open_pipeline(pipeline, data, reads=True)
+    chosen = selection(scene, split or ["test"], setting, modality, protocol, limit, seed)
+    reporter = Reporter(quiet=quiet)
+    with interruptible(f"{into} is as it was"):
+        card = scoring.score(
+            data, file, into, selection=chosen, embodiment=config.embodiment, name=name, adapted=adapted,
+            replace=replace, workers=workers, reporter=reporter,
+        )  # fmt: skip
+    whole = card.rows[0]
+    known = ((MEASURES[m].head[:-2], text(m, value)) for m, value in whole.mean.items() if value is not None)
+    scores = ", ".join(f"{head} {value}" for head, value in known)
+    reporter.line(f"score {card.name}: {whole.episodes:,} episodes replay; {scores}; added to {into}")
+
+
+@app.command("leaderboard")
+def leaderboard(
+    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="Folder of scored runs (score --into).")] = _SCORED,
+    out: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="The page.  (default: leaderboard.html in FOLDER)")
+    ] = None,
+) -> None:
+    """Write the scored runs of a folder as one page: sortable, with intervals, the paper's results beside them."""
+    from aerialdojo_gen.benchmark.leaderboard import write_leaderboard
+
+    page = out or folder / "leaderboard.html"
+    count = write_leaderboard(folder, page)
+    typer.echo(f"{page}: {count} scored run{'s' * (count != 1)}", err=True)

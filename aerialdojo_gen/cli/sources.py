@@ -14,13 +14,15 @@ from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.base.names import choose_scenes, closest
 from aerialdojo_gen.base.text_table import terminal_width
 from aerialdojo_gen.cli import options
-from aerialdojo_gen.cli.common import key_values, merge_scenes, open_pipeline, pipeline_file, print_scene
+from aerialdojo_gen.cli.common import key_values, merge_scenes, print_next, print_scene
+from aerialdojo_gen.dataset.build import open_pipeline, pipeline_file
 from aerialdojo_gen.store.atomic import make_folder
 from aerialdojo_gen.store.root import open_root
 
 if TYPE_CHECKING:
-    from aerialdojo_gen.benchmark.llm.agent import LanguageModelAgent
+    from aerialdojo_gen.base.config.pipeline import Pipeline
     from aerialdojo_gen.imports.command import AddedScene
+    from aerialdojo_gen.pipeline.stage import ProjectPaths
 
 app = typer.Typer()
 
@@ -59,10 +61,7 @@ def add_scene(
         str, typer.Option(help="Lighting of textures: sun (lit by the scene), baked (already in them) or auto.")
     ] = "auto",
     texture_px: Annotated[
-        int,
-        typer.Option(
-            "--texture-px", min=16, max=8192, help="Maximum texture side, pixels; larger textures are reduced."
-        ),
+        int, typer.Option(min=16, max=8192, help="Maximum texture side, pixels; larger textures are reduced.")
     ] = 8192,
     force: Annotated[bool, typer.Option("--force", help="Replace a scene of this name.")] = False,
     show: Annotated[
@@ -92,30 +91,12 @@ def add_scene(
     else:
         made = [command.add_scene(name, mesh, project, options, annotations=annotations, force=force)]
         _describe(made[0])
-    first = next((added for added in made if not added.annotations.exists()), None)
-    if first is not None:
-        print(f"next: {cli_context.command('annotate-draft', first.scene.name, pipeline=first.pipeline)}")
-    print(f"then: {cli_context.command('run', made[0].pipeline, data=project / 'data')}")
+    first = next((added.scene.name for added in made if not added.annotations.exists()), None)
+    print_next(first, made[0].pipeline, project)
 
 
 def _describe(added: AddedScene) -> None:
     print_scene(added.scene, added.repairs.lines)
-
-
-Rewrite = Annotated[
-    str | None,
-    typer.Option(
-        metavar="openai|anthropic",
-        help="Let a language model write the descriptions; those that cannot be verified are dropped.",
-    ),
-]
-ModelOption = Annotated[
-    list[str] | None,
-    typer.Option("--option", help="Option of --rewrite, repeatable: --option model=…, --option base_url=…"),
-]
-Yes = Annotated[bool, typer.Option("--yes", help="Send the requests of --rewrite, whatever they cost.")]
-MaxTokens = Annotated[int | None, typer.Option(min=0, help="Ask --rewrite no more after this number of tokens.")]
-MaxCost = Annotated[float | None, typer.Option(min=0, help="Ask --rewrite no more after this cost, US dollars.")]
 
 
 @app.command("annotate-draft")
@@ -148,30 +129,39 @@ def annotate_draft(
     max_per_category: Annotated[
         int | None,
         typer.Option(
-            min=1,
-            help="Maximum number of objects per other category.  (default: 5; more if a scene has few)",
+            min=1, help="Maximum number of objects per other category.  (default: 5; more if a scene has few)"
         ),
     ] = None,
     landmark: Annotated[list[str] | None, typer.Option(help="Node to use as a landmark; repeatable.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed; the same seed gives the same draft.")] = 0,
     pipeline: options.PipelineFile = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")] = False,
-    rewrite: Rewrite = None,
-    option: ModelOption = None,
-    yes: Yes = False,
-    max_tokens: MaxTokens = None,
-    max_cost: MaxCost = None,
+    rewrite: Annotated[
+        str | None,
+        typer.Option(
+            metavar="openai|anthropic",
+            help="Let a language model write the descriptions; those that cannot be verified are dropped.",
+        ),
+    ] = None,
+    option: Annotated[
+        list[str] | None, typer.Option(help="Option of --rewrite, repeatable: --option model=…, --option base_url=…")
+    ] = None,
+    yes: Annotated[bool, typer.Option("--yes", help="Send the requests of --rewrite, whatever they cost.")] = False,
+    max_tokens: Annotated[
+        int | None, typer.Option(min=0, help="Ask --rewrite no more after this number of tokens.")
+    ] = None,
+    max_cost: Annotated[
+        float | None, typer.Option(min=0, help="Ask --rewrite no more after this cost, US dollars.")
+    ] = None,
     quiet: options.Quiet = False,
 ) -> None:
     """Draft a scene's annotations, for you to check and commit."""
     from aerialdojo_gen.annotations.draft import DraftOptions
     from aerialdojo_gen.imports.drafting import draft_scene
     from aerialdojo_gen.pipeline.progress import Reporter
-    from aerialdojo_gen.pipeline.runner import chosen_scenes, known_scenes
 
     config, roots = open_pipeline(pipeline_file(pipeline), Path("data"))
-    given = named_scene(name, scene)
-    scene = pick_scene(given, known_scenes(roots.recipes) if given else chosen_scenes(config, roots))
+    scene = _one_scene(name, scene, config, roots)
     options = DraftOptions(
         landmarks=tuple(landmark or ()),
         n_landmarks=landmarks,
@@ -186,12 +176,18 @@ def annotate_draft(
     )
     reporter = Reporter(quiet=quiet)
     fresh = rewrite is None or force or not (roots.annotations / f"{scene}.json").exists()
-    agent = None if rewrite is None else _writer(rewrite, option or [], max_cost)
+    agent = None
+    if rewrite is not None:
+        from aerialdojo_gen.studio.annotate.rewrite import make_agent, rewrite_scene
+
+        agent = make_agent(rewrite, key_values(option or []))
+        if max_cost is not None and not agent.priced:
+            prices = "--option input_usd_per_million=… --option output_usd_per_million=…"
+            raise UsageError(f"--max-cost needs prices: {prices}")
     if fresh:
         print(draft_scene(scene, config, roots, options, force=force, reporter=reporter))
     if agent is not None:
         from aerialdojo_gen.benchmark.evaluation import Limits
-        from aerialdojo_gen.studio.annotate.rewrite import rewrite_scene
 
         limits = Limits(max_cost, max_tokens) if yes or (max_tokens, max_cost) != (None, None) else None
         rewrite_scene(scene, roots, agent, limits, again=fresh, say=print)
@@ -199,22 +195,10 @@ def annotate_draft(
             print("nothing was sent: --yes sends it; --max-tokens or --max-cost sends it up to a limit")
 
 
-def _writer(protocol: str, option: list[str], max_cost: float | None) -> LanguageModelAgent:
-    """Make the client of ``--rewrite``."""
-    from aerialdojo_gen.studio.annotate.rewrite import make_agent
-
-    agent = make_agent(protocol, key_values(option))
-    if max_cost is not None and not agent.priced:
-        raise UsageError(
-            "--max-cost needs prices: --option input_usd_per_million=… --option output_usd_per_million=…"
-        )
-    return agent
-
-
 @app.command("gallery")
 def gallery(
     scenes: options.Scenes = None,
-    out: Annotated[Path, typer.Option("--out", help="Folder for the pictures.")] = Path("docs/gallery"),
+    out: Annotated[Path, typer.Option(help="Folder for the pictures.")] = Path("docs/gallery"),
     scene: options.Scene = None, pipeline: options.PipelineFile = None,
     props: Annotated[bool, typer.Option("--props/--no-props", help="Draw the sheets of props too.")] = True,
     small: Annotated[bool, typer.Option("--small", help="Write JPEGs 1280 pixels wide, for web pages.")] = False,
@@ -278,6 +262,14 @@ def named_scene(position: str | None, option: str | None) -> str | None:
     return position or option
 
 
+def _one_scene(position: str | None, option: str | None, config: Pipeline, roots: ProjectPaths) -> str:
+    """Return the scene that is named, by any recipe's name, else one of the pipeline's that is picked."""
+    from aerialdojo_gen.pipeline.runner import chosen_scenes, known_scenes
+
+    given = named_scene(position, option)
+    return pick_scene(given, known_scenes(roots.recipes) if given else chosen_scenes(config, roots))
+
+
 def pick_scene(
     given: str | None, known: Sequence[str], stdin: TextIO | None = None, stderr: TextIO | None = None
 ) -> str:
@@ -322,7 +314,7 @@ def annotate(
     ] = "127.0.0.1",
     browser: options.Browser = True,
     coco: Annotated[
-        Path | None, typer.Option("--coco", help="Write boxes and pictures to this COCO archive (ZIP) and exit.")
+        Path | None, typer.Option(help="Write boxes and pictures to this COCO archive (ZIP) and exit.")
     ] = None,
 ) -> None:
     """Annotate a scene in the browser: landmarks, objects and their anchors."""
@@ -330,12 +322,10 @@ def annotate(
 
     if coco is None:
         require_web()
-    from aerialdojo_gen.pipeline.runner import chosen_scenes, known_scenes
     from aerialdojo_gen.studio.annotate.session import open_session
 
     config, roots = open_pipeline(pipeline, data)
-    given = named_scene(name, scene)
-    scene = pick_scene(given, known_scenes(roots.recipes) if given else chosen_scenes(config, roots))
+    scene = _one_scene(name, scene, config, roots)
     session = open_session(scene, config, roots)
     if coco is not None:
         from aerialdojo_gen.studio.annotate.coco import write_coco

@@ -14,7 +14,8 @@ from aerialdojo_gen.base.errors import StoreError, UsageError
 from aerialdojo_gen.base.shipped import home
 from aerialdojo_gen.base.text_table import terminal_width
 from aerialdojo_gen.cli import options
-from aerialdojo_gen.cli.common import merge_scenes, pipeline_file, print_json
+from aerialdojo_gen.cli.common import merge_scenes, print_json
+from aerialdojo_gen.dataset.build import pipeline_file
 
 if TYPE_CHECKING:
     from aerialdojo_gen.dataset.validate.parts import Release
@@ -24,58 +25,34 @@ app = typer.Typer()
 _MANY_DIGITS = 10
 
 
-CheckedData = Annotated[
-    str,
-    typer.Option(
-        "--data",
-        metavar="DIR|URL",
-        envvar="AERIALDOJO_DATA",
-        callback=options.remember_option,
-        help="Data directory or s3://bucket/prefix; its release is checked.",
-    ),
-]
-Elsewhere = Annotated[
-    str | None,
-    typer.Option("--release", metavar="DIR|URL", help="Another release to check.  (default: the one in --data)"),
-]
-Sample = Annotated[
-    int | None,
-    typer.Option("--sample", min=0, help="Number of routes per scene to check again with FCL.  (default: all)"),
-]
-Pictures = Annotated[
-    str,
-    typer.Option(
-        "--pictures", metavar="N|all", help="Number of reference images per scene to render again and compare."
-    ),
-]
-Meshes = Annotated[
-    Path | None, typer.Option("--meshes", help="Folder of the meshes.  (default: meshes/ next to the release)")
-]
-NoMeshes = Annotated[
-    bool, typer.Option("--no-meshes", help="Skip the checks that need meshes; they are reported as not checked.")
-]
-Report = Annotated[
-    Path | None, typer.Option("--report", help="Write every fault to a .jsonl, .json, .csv or .parquet file.")
-]
-MaxFaults = Annotated[int, typer.Option("--max-faults", min=0, help="Maximum number of faults printed per check.")]
-LineACheck = Annotated[
-    bool, typer.Option("--verbose", "-v", help="Print one line per check instead of one per table.")
-]
-
-
 @app.command("validate")
 def validate(
     scenes: options.Scenes = None,
-    data: CheckedData = "data",
-    elsewhere: Elsewhere = None,
+    data: options.Data = "data",
+    elsewhere: Annotated[
+        str | None,
+        typer.Option("--release", metavar="DIR|URL", help="Another release to check.  (default: the one in --data)"),
+    ] = None,
     scene: options.Scene = None,
-    sample: Sample = None,
-    pictures: Pictures = "all",
-    meshes: Meshes = None,
-    no_meshes: NoMeshes = False,
-    report: Report = None,
-    max_faults: MaxFaults = 10,
-    verbose: LineACheck = False,
+    sample: Annotated[
+        int | None, typer.Option(min=0, help="Number of routes per scene to check again with FCL.  (default: all)")
+    ] = None,
+    pictures: Annotated[
+        str, typer.Option(metavar="N|all", help="Number of reference images per scene to render again and compare.")
+    ] = "all",
+    meshes: Annotated[
+        Path | None, typer.Option(help="Folder of the meshes.  (default: meshes/ next to the release)")
+    ] = None,
+    no_meshes: Annotated[
+        bool, typer.Option("--no-meshes", help="Skip the checks that need meshes; they are reported as not checked.")
+    ] = False,
+    report: Annotated[
+        Path | None, typer.Option(help="Write every fault to a .jsonl, .json, .csv or .parquet file.")
+    ] = None,
+    max_faults: Annotated[int, typer.Option(min=0, help="Maximum number of faults printed per check.")] = 10,
+    verbose: Annotated[
+        bool, typer.Option("--verbose", "-v", help="Print one line per check instead of one per table.")
+    ] = False,
     pipeline: options.PipelineFile = None,
     workers: options.Workers = None,
     executor: options.ExecutorName = "local",
@@ -119,16 +96,16 @@ def validate(
         is_of = f"which is --pipeline {' or '.join(names)}: {definitions.name}"
         reporter.line(f"not the pipeline of the release, {is_of}")
     _name_orphans(release, reporter)
-    found = validation.validate(requested, workers=workers, executor=executor, address=address, reporter=reporter)
+    outcome = validation.validate(requested, workers=workers, executor=executor, address=address, reporter=reporter)
     if report is not None:
-        validation.write_report(found.faults, report)
+        validation.write_report(outcome.faults, report)
     if as_json:
-        print_json(found.as_json())
+        print_json(outcome.as_json())
     else:
         if not quiet:
-            print("\n".join(found.table_lines(terminal_width(), verbose=verbose)))
-        print("\n".join([*found.fault_lines(max_faults), found.verdict()]))
-    if found.faults:
+            print("\n".join(outcome.table_lines(terminal_width(), verbose=verbose)))
+        print("\n".join([*outcome.fault_lines(max_faults), outcome.verdict()]))
+    if outcome.faults:
         raise SystemExit(1)
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from support.flying import town
-from support.llm_agents import KEY, PROTOCOLS
+from support.llm_server import KEY, PROTOCOLS
 from support.walled import write_walled
 
 from aerialdojo_gen.planning.flight_space import FlightSpace

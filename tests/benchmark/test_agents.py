@@ -12,9 +12,8 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from support.extended import set_columns, with_column
 from support.handmade import box, instance, scene
-from support.planting import definitions
+from support.planting import definitions, set_columns, with_column
 
 import aerialdojo_gen
 from aerialdojo_gen.base.errors import StoreError, UsageError

@@ -10,8 +10,27 @@ import traceback
 import cv2
 import numpy as np
 import pytest
-from support.llm_agents import FORWARD_3, KEY, PROTOCOLS, agent_of, begun, goal_for, observation
-from support.llm_server import MOVE, Call, Cut, Drip, Endless, Filtered, Hang, Raw, Say, Status, Trickle, serving
+from support.llm_server import (
+    FORWARD_3,
+    KEY,
+    MOVE,
+    PROTOCOLS,
+    Call,
+    Cut,
+    Drip,
+    Endless,
+    Filtered,
+    Hang,
+    Raw,
+    Say,
+    Status,
+    Trickle,
+    agent_of,
+    begun,
+    goal_for,
+    observation,
+    serving,
+)
 
 from aerialdojo_gen.base import llm_client
 from aerialdojo_gen.base.errors import AerialDojoError, MissingPackage, UsageError

@@ -7,8 +7,7 @@ from itertools import pairwise
 
 import pytest
 from support.command_line import called
-from support.llm_agents import KEY, agent_of, goal_for, observation
-from support.llm_server import Cut, Raw, Say, Status, serving
+from support.llm_server import KEY, Cut, Raw, Say, Status, agent_of, goal_for, observation, serving
 
 from aerialdojo_gen.base.errors import StoreError, UsageError
 from aerialdojo_gen.benchmark.agents import load_agent

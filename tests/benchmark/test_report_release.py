@@ -16,7 +16,7 @@ import pyarrow.parquet as pq
 import pytest
 from support.browser import errors
 from support.command_line import called
-from support.extended import set_difficulty
+from support.planting import set_difficulty
 
 from aerialdojo_gen.base.errors import AerialDojoError
 from aerialdojo_gen.benchmark.episodes import read_run

@@ -4,35 +4,36 @@ import re
 import subprocess
 import sys
 
-import pytest
 import typer.main
 from support.command_line import called
 
 from aerialdojo_gen.cli import app as cli
 from aerialdojo_gen.pipeline.registry import STAGES, upstream
 
-HEAVY = ("numpy", "pyarrow", "numba", "fcl", "pybullet", "trimesh", "cv2", "scipy", "av")
+HEAVY = {"av", "cv2", "fcl", "gymnasium", "moderngl", "numba", "numpy", "pyarrow", "pybullet", "scipy", "trimesh"}
 
 
-def test_help_imports_nothing_heavy():
+def test_importing_the_package_and_asking_for_help_loads_nothing_heavy():
     code = (
-        "import sys\nfrom aerialdojo_gen.cli import app as cli\n"
+        "import sys\nimport aerialdojo_gen\nfrom aerialdojo_gen.cli import app as cli\nprint(*sys.modules)\n"
         "for args in ['--help'], ['plan', '--help'], ['render', '--help']:\n"
         "    try:\n        cli.app(args)\n    except SystemExit: pass\n"
-        f"    print([m for m in {HEAVY!r} if m in sys.modules])"
+        "print(*sys.modules)"
     )
     out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
-    assert out.count("Usage") == out.count("\n[]\n") == 3
+    assert out.count("Usage") == 3
+    first, *_, last = ({name.partition(".")[0] for name in line.split()} for line in out.splitlines())
+    assert not first & (HEAVY | {"pydantic"})
+    assert not last & HEAVY
 
 
 def test_every_stage_has_a_command_with_the_common_options_and_its_own_help():
-    listed = " ".join(called("--help", COLUMNS="200").stdout.split())
+    commands = typer.main.get_command(cli.app).commands
+    common = {"--data", "--scene", "--pipeline", "--workers", "--force", "--quiet", "--executor"}
     for one in STAGES:
-        assert f"{one.name} {one.help}" in listed
-        text = called(one.name, "--help").stdout
-        assert one.help.split()[0] in text
-        for option in ("--data", "--scene", "--pipeline", "--workers", "--force", "--quiet"):
-            assert option in text, (one.name, option)
+        command = commands[one.name]
+        assert command.help == one.help
+        assert common <= {text for option in command.params for text in option.opts}, one.name
 
 
 def test_the_commands_are_listed_by_purpose():
@@ -53,19 +54,6 @@ def test_the_help_of_run_names_every_pipeline(project):
     text = " ".join(called("run", "--help").stdout.split())
     for file in (project / "pipelines").glob("*.toml"):
         assert file.stem in text
-
-
-@pytest.mark.parametrize(
-    ("command", "words"),
-    [("plan --scene U_Mal_0", ["no scene 'U_Mal_0'", "U_Mall_0"]), ("run mine.toml", ["nowhere", "set recipes"])],
-)
-def test_what_a_user_gets_wrong_is_one_line_and_leaves_nothing(tmp_path, command, words):
-    (tmp_path / "mine.toml").write_text("recipes = 'nowhere'\n")
-    result = called(*command.split(), cwd=tmp_path)
-    assert result.returncode == 2
-    assert re.fullmatch(r"error: [^\n]+\n", result.stderr)
-    assert all(word in result.stderr for word in words), result.stderr
-    assert [path.name for path in tmp_path.iterdir()] == ["mine.toml"]
 
 
 def test_upstream_of_each_stage_is_all_it_reads():

@@ -51,7 +51,8 @@ NO_SENSE = [
     "evaluate --run ../run", "train nothing", "train imitation --renderer nothing",
     *(f"render {option} nothing" for option in (
         "--split", "--profile", "--renderer", "--sampling", "--frames", "--shard", "--budget")),
-    "plan --workers 0", "plan --executor nothing", "run nothing", "validate --report faults.txt",
+    "plan --workers 0", "plan --executor nothing", "run nothing", "run mine.toml",
+    "build-scenes --watch U_Nil_0.toml", "validate --report faults.txt",
     *(f"report {option} nothing" for option in ("--format", "--group", "--profile", "--table")),
     "export --format nothing",
     *(f"export --format lerobot {option} nothing" for option in ("--split", "--view", "--goal", "--source")),
@@ -103,10 +104,13 @@ def test_an_unknown_option_is_2(name, ended):
 @pytest.mark.parametrize("given", [*(f"{name} {NEEDED.get(name, '')} {WRONG[name]}" for name in NAMES), *NO_SENSE])
 def test_what_makes_no_sense_is_2(given, ended):
     Path("mesh.obj").write_text("v 0 0 0\nv 10 0 0\nv 10 10 0\nv 0 10 5\nf 1 2 3\nf 1 3 4\n")
+    Path("mine.toml").write_text("recipes = 'nowhere'\n")
+    there = set(Path().iterdir())
     code, said = ended(given)
     assert code == 2, said
     assert said.startswith("error: ")
     assert said.count("\n") == 1
+    assert set(Path().iterdir()) == there
 
 
 @pytest.mark.parametrize("name", [name for name in NAMES if name not in ("annotate-draft", "config show", "status")])

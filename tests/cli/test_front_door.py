@@ -5,16 +5,18 @@ import shlex
 import subprocess
 import sys
 from functools import partial
+from pathlib import Path
 
 import pytest
 import typer.main
 from support.command_line import called, said
 
-from aerialdojo_gen.base.errors import UsageError
+from aerialdojo_gen.base.errors import ConfigError, UsageError
 from aerialdojo_gen.base.shipped import home
 from aerialdojo_gen.cli import app as cli
 from aerialdojo_gen.cli.evaluate import rerun_command
 from aerialdojo_gen.cli.sources import named_scene, pick_scene
+from aerialdojo_gen.learning.recipe import load_recipe
 from aerialdojo_gen.pipeline.registry import STAGES, upstream
 from aerialdojo_gen.store import shards
 
@@ -57,11 +59,25 @@ def test_pipelines_that_are_shipped_go_by_name_anywhere(call, tmp_path, monkeypa
     assert call("config", "init", "smoke.toml", "--from", "smoke")[0] == 0
     (tmp_path / "smoke.toml").write_text("seed = 77\n")
     assert "seed = 77" in call("config", "show", "--pipeline", "smoke.toml")[1], "what lies here goes before"
+    (tmp_path / "smoke.toml").write_text("recipes = 'nowhere'\n")
+    said = f"error: no folder {tmp_path / 'nowhere'}: set recipes in the pipeline file\n"
+    assert call("run", "smoke.toml")[2] == said
     for wanted in ("smok", "nowhere/smoke.toml", "pipelines/smoke.toml"):
         code, _, said = call("run", wanted)
         assert code == 2
         assert said.count("\n") == 1
         assert said.endswith("aerialdojo-200k, aerialdojo-hard, smoke\n"), said
+
+
+def test_recipes_that_are_shipped_go_by_name_anywhere(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    shipped = load_recipe(home() / "pipelines" / "baselines" / "imitation.toml")
+    assert load_recipe("imitation") == load_recipe("imitation.toml") == shipped
+    Path("imitation").write_text('name = "mine"\n')
+    assert load_recipe("imitation").name == "mine", "what lies here goes before"
+    known = "by name, as in aerialdojo-gen train imitation: adapt, adapt-mall, blind, imitation"
+    with pytest.raises(ConfigError, match=f"no recipe imitatoin; {known}"):
+        load_recipe("imitatoin")
 
 
 def test_one_of_several_scenes_is_picked_by_number_or_name():

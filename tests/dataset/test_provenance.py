@@ -14,8 +14,7 @@ from support.releases import files_of
 
 from aerialdojo_gen.base.config.pipeline import load_pipeline
 from aerialdojo_gen.base.errors import StoreError, UsageError
-from aerialdojo_gen.cli.common import open_pipeline
-from aerialdojo_gen.dataset.build import run_pipeline
+from aerialdojo_gen.dataset.build import open_pipeline, run_pipeline
 from aerialdojo_gen.dataset.contents import existing_scenes
 from aerialdojo_gen.pipeline import runner
 from aerialdojo_gen.store import shards as store

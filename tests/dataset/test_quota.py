@@ -10,7 +10,7 @@ from support.handmade import write_rows
 
 from aerialdojo_gen.base.errors import PoolError
 from aerialdojo_gen.base.paper_figures import inventory, splits
-from aerialdojo_gen.cli.common import open_pipeline
+from aerialdojo_gen.dataset.build import open_pipeline
 from aerialdojo_gen.pipeline import runner
 from aerialdojo_gen.pipeline.runner import stages_named
 from aerialdojo_gen.pipeline.stages.work.candidate_policy import (

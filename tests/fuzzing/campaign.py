@@ -7,7 +7,6 @@ import os
 import signal
 import subprocess
 import sys
-import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -46,43 +45,30 @@ def corpus(name: str) -> list[Try]:
 def run(todo: Sequence[Try], seed: int = 0) -> dict[str, Outcome]:
     """Try mutants and inputs in their order, each in the same process as the last unless that died."""
     outcomes = {name: Outcome() for name, _ in todo}
-    while todo:
-        todo = todo[_process(todo, seed, outcomes) :]
-    return outcomes
-
-
-def _process(todo: Sequence[Try], seed: int, outcomes: dict[str, Outcome]) -> int:
-    """Run a process until it ends or dies; return how many tries that was."""
     environment = os.environ | {
         "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1",
         "PYTHONPATH": os.pathsep.join([str(TESTS), str(TESTS.parent), os.environ.get("PYTHONPATH", "")]),
     }  # fmt: skip
-    done = 0
-    with tempfile.TemporaryFile("w+", errors="replace") as errors, tempfile.TemporaryFile("w+") as plan:
-        json.dump(todo, plan)
-        plan.seek(0)
-        command = [sys.executable, *COMMAND, str(seed)]
-        with subprocess.Popen(command, stdin=plan, stdout=subprocess.PIPE, stderr=errors, env=environment) as process:
-            assert process.stdout is not None
-            for line in process.stdout:
-                (name, at), (seconds, peak_mib, fault) = todo[done], json.loads(line)
-                outcome, done = outcomes[name], done + 1
-                outcome.ran += 1
-                outcome.seconds += seconds
-                outcome.peak_mib = max(outcome.peak_mib, peak_mib)
-                outcome.faults += [{**fault, "index": at}] if fault else []
-        errors.seek(0)
-        said = errors.read()
-    if done == len(todo):
-        return done
-    if process.returncode == 1 and "Traceback" in said:
-        raise RuntimeError(f"the worker cannot run: {said[-2000:]}")
-    name, at = todo[done]
-    died = f"died of {process.returncode}"
-    kind = {-signal.SIGPROF: "hang", -signal.SIGALRM: "stuck"}.get(process.returncode, died)
-    outcomes[name].ran += 1
-    outcomes[name].faults.append({"index": at, "kind": kind, "message": said[-300:], "where": ""})
-    return done + 1
+    while todo:
+        done = subprocess.run(
+            [sys.executable, *COMMAND, str(seed)], input=json.dumps(todo), env=environment, capture_output=True,
+            text=True, errors="replace", check=False,
+        )  # fmt: skip
+        if done.returncode == 1 and "Traceback" in done.stderr:
+            raise RuntimeError(f"the worker cannot run: {done.stderr[-2000:]}")
+        tries = [*map(json.loads, done.stdout.splitlines())]
+        if len(tries) < len(todo):
+            died = f"died of {done.returncode}"
+            kind = {-signal.SIGPROF: "hang", -signal.SIGALRM: "stuck"}.get(done.returncode, died)
+            tries.append([0.0, 0, {"kind": kind, "message": done.stderr[-300:], "where": ""}])
+        for (name, at), (seconds, peak_mib, fault) in zip(todo, tries, strict=False):
+            outcome = outcomes[name]
+            outcome.ran += 1
+            outcome.seconds += seconds
+            outcome.peak_mib = max(outcome.peak_mib, peak_mib)
+            outcome.faults += [{**fault, "index": at}] if fault else []
+        todo = todo[len(tries) :]
+    return outcomes
 
 
 def save(name: str, seed: int, fault: dict, folder: Path) -> None:

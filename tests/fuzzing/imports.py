@@ -14,13 +14,9 @@ from aerialdojo_gen.exchange.importing import Options, import_benchmark
 
 
 def _aerialdojo() -> list[Case]:
-    from support.authors_files import document, put
-
-    return [made(lambda folder, turn=turn: put(folder, *document(turn))) for turn in (15, 60)]
-
-
-def _written(document: Callable[[Path], object]) -> Callable[[], list[Case]]:
-    return lambda: [made(lambda folder: task_files.write(folder / "tasks.json", document(folder)))]
+    return [
+        made(lambda folder, turn=turn: task_files.put_authors(folder, *task_files.authors(turn))) for turn in (15, 60)
+    ]
 
 
 def _import(format_name: str, file: str = "tasks.json") -> Callable[[Path], None]:
@@ -41,7 +37,10 @@ def _import(format_name: str, file: str = "tasks.json") -> Callable[[Path], None
 
 
 def _of(format_name: str, document: Callable[[Path], object]) -> Target:
-    return Target(_written(document), _import(format_name), ".json", names_the_file=False)
+    def cases() -> list[Case]:
+        return [made(lambda folder: task_files.write(folder / "tasks.json", document(folder)))]
+
+    return Target(cases, _import(format_name), ".json", names_the_file=False)
 
 
 TARGETS = {

@@ -92,6 +92,10 @@ _COURT = {
 }  # fmt: skip
 
 
+def _plans() -> list[Case]:
+    return [{f"scenes/{name}.toml": toml_dumped(plan).encode()} for name, plan in PLANS.items()]
+
+
 def _build(folder: Path) -> None:
     (path,) = folder.rglob("*.toml")
     write_glb(build_scene(path, load_catalogue(ASSETS)), path.with_suffix(".glb"))
@@ -132,13 +136,8 @@ def _instantiate(folder: Path) -> None:
 
 def _materials() -> list[Case]:
     own = {"brick": {"texture": "brick", "colour": "#9a4a3c", "tile_m": 0.75}, "paint": {"colour": "#808080"}}
-    prop = {
-        "post": {
-            "name": "post",
-            "roles": {"body": "brick"},
-            "parts": [{"shape": "box", "role": "body", "size": [1, 1, 2]}],
-        }
-    }
+    box = {"shape": "box", "role": "body", "size": [1, 1, 2]}
+    prop = {"post": {"name": "post", "roles": {"body": "brick"}, "parts": [box]}}
     return [{"materials.toml": toml_dumped(own).encode(), f"{FOLDERS[1]}/x.toml": toml_dumped(prop).encode()}]
 
 
@@ -146,11 +145,7 @@ TARGETS = {
     "annotations": Target(_annotations, _read_annotations),
     "pipeline": Target(_pipelines, lambda folder: load_pipeline(folder / "p.toml").model_dump_json()),
     "recipe": Target(lambda: [{"scenes/U_Court_0.toml": toml_dumped(_COURT).encode()}], _build),
-    "plan": Target(
-        lambda: [{f"scenes/{name}.toml": toml_dumped(plan).encode()} for name, plan in PLANS.items()],
-        _build,
-        share=0.05,
-    ),
+    "plan": Target(_plans, _build, share=0.05),
     "recipe-imported": Target(_imported_recipes, _build, ".toml", names_the_file=False),
     "prop": Target(_props, _instantiate, "x.toml"),
     "materials": Target(_materials, _instantiate),

@@ -120,13 +120,8 @@ def _journals() -> list[Case]:
     return [{"x.jsonl": b"".join(json.dumps({"task_id": f"t{k}"} | record).encode() + b"\n" for k in range(3))}]
 
 
-def _read_journal(folder: Path) -> None:
-    for record in episodes.read_journal(folder / "x.jsonl"):
-        json.dumps(record).encode()
-
-
 TARGETS = {
     "answer": Target(_answers, _read_answer, names_the_file=False), "shard": Target(_shards, _read_shard),
     "recording-note": Target(_notes, _find, ".json"), "recording": Target(_recordings, _read_recording),
-    "journal": Target(_journals, _read_journal),
+    "journal": Target(_journals, lambda folder: json.dumps([*episodes.read_journal(folder / "x.jsonl")]).encode()),
 }  # fmt: skip

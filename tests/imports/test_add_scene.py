@@ -13,8 +13,7 @@ from support.foreign import raw, read_here
 
 from aerialdojo_gen.annotations.draft import DraftOptions
 from aerialdojo_gen.base.errors import AnnotationError, AssetError, StoreError, UsageError
-from aerialdojo_gen.cli.common import open_pipeline
-from aerialdojo_gen.dataset.build import run_pipeline
+from aerialdojo_gen.dataset.build import open_pipeline, run_pipeline
 from aerialdojo_gen.imports.command import add_scene
 from aerialdojo_gen.imports.drafting import draft_scene
 from aerialdojo_gen.imports.files import read_mesh

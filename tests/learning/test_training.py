@@ -12,8 +12,8 @@ import numpy as np
 import pyarrow as pa
 import pytest
 from scipy.stats import binomtest
-from support.extended import set_columns
 from support.flying import free_poses, town
+from support.planting import set_columns
 from support.trainings import (
     assert_same_training,
     history,

@@ -18,7 +18,7 @@ from aerialdojo_gen.base.config.pipeline import Pipeline, load_pipeline
 from aerialdojo_gen.base.config.sections import PROFILES, ClipConfig, VlmConfig
 from aerialdojo_gen.base.config.shared import shared_values
 from aerialdojo_gen.base.errors import ConfigError
-from aerialdojo_gen.cli.common import open_pipeline
+from aerialdojo_gen.dataset.build import open_pipeline
 from aerialdojo_gen.pipeline import freshness
 from aerialdojo_gen.pipeline.registry import BY_NAME
 from aerialdojo_gen.store import shards as store

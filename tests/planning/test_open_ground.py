@@ -15,8 +15,7 @@ from support.planting import Planted, check, poses
 
 from aerialdojo_gen.annotations.draft import DraftOptions
 from aerialdojo_gen.base.config.sections import PlanConfig
-from aerialdojo_gen.cli.common import open_pipeline
-from aerialdojo_gen.dataset.build import run_pipeline
+from aerialdojo_gen.dataset.build import open_pipeline, run_pipeline
 from aerialdojo_gen.dataset.validate.reachability import open_ground
 from aerialdojo_gen.geometry.ground import Ground
 from aerialdojo_gen.imports.command import add_scene

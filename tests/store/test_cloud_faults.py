@@ -9,8 +9,7 @@ import sys
 
 import pytest
 from support.command_line import called
-from support.roots import fill, read_folder, write
-from support.s3_server import Proxy, forget_clients
+from support.s3_server import Proxy, fill, forget_clients, read_folder, write
 
 from aerialdojo_gen.base.errors import StoreError
 from aerialdojo_gen.store import schemas
@@ -163,7 +162,7 @@ def test_who_lost_the_lock_writes_nothing_more(cloud: str):
         taken = b'{"token": "another", "holder": "another", "lease_s": 60}'
         bucket.put_bytes("data/.aerialdojo-lock.json", taken)
         code = (
-            "import pickle, sys; from support.roots import write; write(pickle.load(sys.stdin.buffer), 't/a/x', b'y')"
+            "import pickle, sys; import support.s3_server as s; s.write(pickle.load(sys.stdin.buffer), 't/a/x', b'y')"
         )
         done = subprocess.run([sys.executable, "-c", code], input=pickle.dumps(worker), capture_output=True,
                               cwd=os.path.dirname(os.path.dirname(__file__)), check=False)  # fmt: skip

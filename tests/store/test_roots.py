@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 from support.handmade import filled
-from support.roots import fill, read_folder, write
+from support.s3_server import fill, read_folder, write
 
 from aerialdojo_gen.base.errors import StoreError, UsageError
 from aerialdojo_gen.dataset.contents import existing_scenes, prune_release

@@ -7,14 +7,15 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from support.viewing import YARD, draw, ready, served
+from support.pages import YARD, draw, ready, serving
 
 
 @pytest.fixture(scope="session")
 def view_url(smoke: Path) -> Iterator[str]:
     """The start page's address of a server of the whole smoke release."""
-    with served(smoke) as url:
-        yield url
+    with serving("view", "--data", smoke) as page:
+        yield page.url
+    assert page.out == ""
 
 
 @pytest.fixture

@@ -9,13 +9,12 @@ import zipfile
 import numpy as np
 import pytest
 from starlette.testclient import TestClient
-from support import annotating
-from support.annotating import AUTHOR, YARD
+from support.pages import AUTHOR, YARD, yard_in
 
 from aerialdojo_gen.base.constants import DIRECTIONS
 from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.base.pictures import decode_rgb
-from aerialdojo_gen.cli.common import open_pipeline
+from aerialdojo_gen.dataset.build import open_pipeline
 from aerialdojo_gen.studio.annotate.coco import write_coco
 from aerialdojo_gen.studio.annotate.server import STATIC, TokenGate, make_app, serve_session
 from aerialdojo_gen.studio.annotate.session import AnnotationSession, open_session
@@ -46,7 +45,7 @@ def refused(answer, why, status=400):
 
 @pytest.fixture(scope="module")
 def yard(project, tmp_path_factory) -> AnnotationSession:
-    place = annotating.yard_in(project, tmp_path_factory.mktemp("yard"))
+    place = yard_in(project, tmp_path_factory.mktemp("yard"))
     yard = open_session(YARD, *open_pipeline(place.pipeline, place.data))
     yield yard
     yard.anchors.close()
@@ -272,7 +271,7 @@ def test_other_machines_are_served_if_asked_for_and_need_the_token(tool, desk):
 def test_an_address_that_is_none_or_several_scenes_are_refused(desk, project, tmp_path):
     with pytest.raises(UsageError, match="--host nowhere: give an IPv4 address"):
         serve_session(desk, port=0, host="nowhere", browser=False, say=print)
-    place = annotating.yard_in(project, tmp_path)
+    place = yard_in(project, tmp_path)
     for name, why in (("U_*", "annotate one at a time"), ("u_courtyard_0", "U_Courtyard_0")):
         with pytest.raises(UsageError, match=why):
             open_session(name, *open_pipeline(place.pipeline, place.data))

@@ -2,27 +2,21 @@
 
 import contextlib
 import fcntl
-import http.client
-import json
+import itertools
 import os
 import shutil
-import signal
 import tempfile
-import threading
-import urllib.request
 from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
 from starlette.testclient import TestClient
-from support import annotating
-from support.browser import until
 from support.hills import CELL_M, Hills
+from support.preload import killed_at
 
 from aerialdojo_gen.base.errors import AssetError
-from aerialdojo_gen.cli.common import open_pipeline
-from aerialdojo_gen.dataset.build import run_pipeline
+from aerialdojo_gen.dataset.build import open_pipeline, run_pipeline
 from aerialdojo_gen.imports.command import add_scene
 from aerialdojo_gen.imports.import_mesh import MeshOptions
 from aerialdojo_gen.scenes.build import build_scene, cut_out
@@ -141,61 +135,45 @@ def test_what_is_boxed_out_is_annotated_becomes_an_object_and_can_be_put_back(te
     desk.anchors.close()
 
 
-def taken(path: Path):
-    """Whether somebody holds a lock."""
-    with path.open("a") as file:
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            return True
-    return False
-
-
-def ask_for_the_shed(url):
-    with contextlib.suppress(OSError, http.client.HTTPException):
-        body = json.dumps(box_of("shed", *SHED)).encode()
-        urllib.request.urlopen(urllib.request.Request(url + "api/boxes", body, {"Content-Type": "application/json"}))
+IMPORTS = """
+from aerialdojo_gen.dataset.build import open_pipeline
+from aerialdojo_gen.studio.annotate.session import open_session
+"""
+BOX_OUT = f"""
+import os, sys
+from pathlib import Path
+{IMPORTS}
+here = Path(sys.argv[1])
+open_session("Scan", *open_pipeline(here / "pipeline.toml", here / "data")).cut(*{SHED}, "shed")
+os._exit(0)
+"""
 
 
 @pytest.mark.kill
-@pytest.mark.parametrize("moment", ["in the build", pytest.param("after it", marks=pytest.mark.nightly)])
-def test_a_server_that_is_killed_leaves_a_recipe_that_is_whole(terrain, project, tmp_path, moment):
-    data, recipe = tmp_path / "data", terrain.pipeline.parent / "scenes" / "Scan.toml"
-    assets, pipeline = tmp_path / "scene_assets", tmp_path / "pipeline.toml"
-    shutil.copytree(project / "scene_assets", assets, ignore=shutil.ignore_patterns("scenes", "smoke"))
-    annotations = tmp_path / "annotations"
-    pipeline.write_text(
-        f'name = "mine"\nseed = 7\nscene_assets = "{assets}"\nrecipes = "{recipe.parent}"\n'
-        f'annotations = "{annotations}"\n[annotate-import]\npaper_counts = false\n'
-    )
-    materials, before = assets / "materials.toml", recipe.read_bytes()
-    place = annotating.Place("Scan", pipeline, data, annotations / "Scan.json")
-    with annotating.served(project, place) as (url, process):
-        asking = threading.Thread(target=ask_for_the_shed, args=(url,))
-        shard = data / "scenes" / "Scan" / "part-00000.parquet"
-        was = shard.stat().st_ino
-        if moment == "in the build":
-            # It hangs, for want of somebody who writes into the pipe that it reads.
-            materials.rename(tmp_path / "kept.toml")
-            os.mkfifo(materials)
-        asking.start()
-        if moment == "in the build":
-            until("the build", lambda: taken(data / ".lock"))
-        else:
-            while shard.stat().st_ino == was:  # the new scene is not in the store
-                assert asking.is_alive()
-        os.kill(process.pid, signal.SIGKILL)
-        asking.join()
-    if moment == "in the build":
-        (tmp_path / "kept.toml").replace(materials)
-        assert recipe.read_bytes() == before
-    boxed = recipe.read_bytes().count(b"shed_000")
-    assert boxed == (recipe.read_bytes() != before)
-    # Whoever comes next finds the scene of the recipe, and may change it.
-    desk = open_session("Scan", *open_pipeline(pipeline, data))
-    if not boxed:
-        desk.cut(*SHED, "shed")
-    desk.uncut("shed_000")
-    desk.anchors.close()
-    assert recipe.read_bytes() == before
+def test_killed_at_any_rename_of_boxing_out_the_recipe_is_whole(terrain, tmp_path):
+    def opened(folder):
+        return open_session("Scan", *open_pipeline(folder / "pipeline.toml", folder / "data"))
+
+    mine = shutil.copytree(terrain.pipeline.parent, tmp_path / "mine")
+    opened(mine).anchors.close()
+    before, boxed = (mine / "scenes" / "Scan.toml").read_bytes(), []
+    with killed_at(BOX_OUT, IMPORTS, ONLY="rename renameat2") as run:
+        for n in itertools.count(1):
+            here = shutil.copytree(mine, tmp_path / str(n))
+            ended, recipe = run(n, here), here / "scenes" / "Scan.toml"
+            boxed.append(recipe.read_bytes() != before)
+            assert recipe.read_bytes().count(b"shed_000") == boxed[-1]
+            # Whoever comes next finds the scene of the recipe, and may change it.
+            desk = opened(here)
+            if not boxed[-1]:
+                desk.cut(*SHED, "shed")
+            desk.uncut("shed_000")
+            desk.anchors.close()
+            assert recipe.read_bytes() == before
+            if not ended:
+                break
+    # The recipe comes last: what is killed in the build has left it alone.
+    assert boxed == sorted(boxed)
+    assert boxed.count(False) > 1
+    assert boxed[-1]
     assert not list(SCRATCH.rglob("Scan.toml"))

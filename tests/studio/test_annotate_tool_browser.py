@@ -1,22 +1,19 @@
 """The annotation page in a real browser: a foreign mesh up to tasks; two tabs at odds; a server that dies."""
 
 import contextlib
-import http.client
 import itertools
 import json
-import os
-import signal
 import socket
 import threading
 import time
-import urllib.request
 
+import httpx
 import pyarrow.compute as pc
 import pytest
-from support import annotating, foreign
 from support import browser as chrome
-from support.annotate_page import Page, entries
+from support import foreign
 from support.browser import until
+from support.pages import NAMELESS, YARD, Page, Place, entries, serving, yard_in
 
 from aerialdojo_gen.dataset.build import run_pipeline
 from aerialdojo_gen.imports.command import add_scene
@@ -25,11 +22,6 @@ from aerialdojo_gen.store import shards as store
 
 NAME = "Village"
 WORDS = ("one", "two", "three")
-UNLABELLED = """
-  const named = (e) => e.labels?.length || e.getAttribute("aria-label") || e.textContent.trim();
-  return [...document.querySelectorAll("input, select, textarea, button, progress, [role=application]")]
-    .filter((e) => !named(e)).map((e) => e.outerHTML);
-"""
 # Of axe's rules: listitem, aria-allowed-role, and what may stand in a label.
 MISPLACED = """
   const wrong = [];
@@ -46,7 +38,7 @@ WATCH = """
   const status = document.getElementById("saved");
   const unsaved = () => JSON.parse(sessionStorage.getItem("aerialdojo-annotate-queue-" + arguments0) ?? "[]").length;
   new MutationObserver(() => window.said.push([status.textContent, unsaved()])).observe(status, { childList: true });
-""".replace("arguments0", json.dumps(annotating.YARD))
+""".replace("arguments0", json.dumps(YARD))
 TICKS = """
   const later = window.setTimeout;
   window.ticks = 0;
@@ -67,12 +59,12 @@ def roof(house):
 def test_a_foreign_mesh_is_annotated_in_the_browser_and_becomes_tasks(browser, project, tmp_path):
     foreign.village().export(tmp_path / "village.glb")
     scene = add_scene(NAME, tmp_path / "village.glb", tmp_path / "mine", MeshOptions())
-    place = annotating.Place(NAME, scene.pipeline, tmp_path / "data", scene.annotations)
+    place = Place(NAME, scene.pipeline, tmp_path / "data", scene.annotations)
     mark = scene.scene["clock_tower_0000"]
     targets = [scene.scene[f"house_{k:04d}"] for k in (2, 3, 4)]  # each alone in its direction
     bounds = scene.scene.bounds.tolist()
-    with annotating.served(project, place) as (url, _):
-        page = Page(browser, url)
+    with serving(*place.command) as served:
+        page = Page(browser, served.url)
         page.one("#who").send_keys("Ada")
         assert page.text("#objects .empty").startswith("none yet")
         # A landmark: pick, L, a name.
@@ -105,7 +97,7 @@ def test_a_foreign_mesh_is_annotated_in_the_browser_and_becomes_tasks(browser, p
             page.saved()
             page.leave()
         assert page.text("#progress-text") == "3 of 3 objects done"
-        assert browser.execute_script(UNLABELLED) == []
+        assert browser.execute_script(NAMELESS) == []
         written = scene.annotations.read_text()
         # Reload: it is all there.
         browser.refresh()
@@ -146,24 +138,22 @@ def test_a_foreign_mesh_is_annotated_in_the_browser_and_becomes_tasks(browser, p
 class Yard:
     """The yard's annotations, and its server, always on one port, which may die and be started again."""
 
-    def __init__(self, project, place):
-        self._project, self.annotations, self._place = project, place.annotations, place
+    def __init__(self, place):
+        self.annotations, self._place = place.annotations, place
         with socket.socket() as free:
             free.bind(("127.0.0.1", 0))
             self.port = free.getsockname()[1]
-        self._running = contextlib.ExitStack()
-        self._process = None
+        self._running, self._served = contextlib.ExitStack(), None
 
     def start(self):
-        if self._process is None:
-            served = annotating.served(self._project, self._place, self.port)
-            self.url, self._process = self._running.enter_context(served)
+        if self._served is None:
+            self._served = self._running.enter_context(serving(*self._place.command, "--port", self.port))
+            self.url = self._served.url
 
     def kill(self):
-        os.kill(self._process.pid, signal.SIGKILL)
-        self._process.wait()
-        self._process = None
-        self._running.close()
+        self._served.process.kill()
+        self.close()
+        self._served = None
 
     def close(self):
         self._running.close()
@@ -171,8 +161,7 @@ class Yard:
 
 @pytest.fixture(scope="module")
 def yard(project, tmp_path_factory):
-    yard = Yard(project, annotating.yard_in(project, tmp_path_factory.mktemp("yard")))
-    with contextlib.closing(yard):
+    with contextlib.closing(Yard(yard_in(project, tmp_path_factory.mktemp("yard")))) as yard:
         yield yard
 
 
@@ -237,14 +226,12 @@ def test_the_page_keeps_its_shape_its_selection_and_what_is_typed(browser, page,
 
 def rename_on_and_on(url, answered):
     """Change an object's name again and again, as another program, until nobody answers."""
-    with contextlib.suppress(OSError, http.client.HTTPException):
-        version = json.loads(urllib.request.urlopen(url + "api/document").read())["version"]
+    with httpx.Client(base_url=url) as client, contextlib.suppress(httpx.HTTPError):
+        version = client.get("api/document").json()["version"]
         for n in itertools.count():
             operation = {"do": "change", "kind": "objects", "id": 1, "fields": {"name": f"thing {n}"}}
-            body = json.dumps({"who": "Robot", "client": "robot", "operation": operation}).encode()
-            headers = {"Content-Type": "application/json", "If-Match": version}
-            answer = urllib.request.urlopen(urllib.request.Request(url + "api/operations", body, headers))
-            version = json.loads(answer.read())["version"]
+            body = {"who": "Robot", "client": "robot", "operation": operation}
+            version = client.post("api/operations", json=body, headers={"If-Match": version}).json()["version"]
             answered.append(n)
 
 

@@ -2,9 +2,6 @@
 
 import io
 import re
-import signal
-import subprocess
-import sys
 from contextlib import contextmanager
 
 import numpy as np
@@ -13,6 +10,7 @@ from PIL import Image
 from starlette.testclient import TestClient
 from support.browser import errors, until
 from support.command_line import called
+from support.pages import serving
 
 from aerialdojo_gen.base.errors import StoreError, UsageError
 from aerialdojo_gen.benchmark.agents import Sensors
@@ -131,7 +129,7 @@ def test_what_is_refused_and_how_deep_it_is(smoke, tmp_path):
     assert (missed["termination"], missed["n_refused"], missed["stop_called"]) == ("stop", 1, True)
 
 
-def test_only_the_shown_states_own_answer_counts_and_only_from_this_page(smoke, tmp_path):
+def test_only_the_shown_states_own_answer_counts_of_one_page_one_pilot_and_one_selection(smoke, tmp_path):
     with flying(smoke, tmp_path) as (client, consent):
         assert client.get("/api/pictures/front").status_code == 404
         assert client.post("/api/act", json={"version": consent["version"], "action": 1}).status_code == 409
@@ -148,13 +146,9 @@ def test_only_the_shown_states_own_answer_counts_and_only_from_this_page(smoke, 
         assert client.get("/api/depth/behind/at?x=0&y=0").status_code == 404
         assert client.get("/api/pictures/goal").status_code == 404
         assert client.get("/api/state").json() == state
-
-
-def test_another_selection_or_a_second_pilot_of_a_run_is_refused(smoke, tmp_path):
-    with flying(smoke, tmp_path) as (client, state):
         with pytest.raises(StoreError, match="another run is writing"), flying(smoke, tmp_path):
             pass
-        fly(client, post(client, "agree", state), [0])
+        fly(client, state, [STOP])
     with pytest.raises(UsageError, match="was begun with limit = 2, not 3"):
         flying(smoke, tmp_path, Selection(modalities=("semantic",), limit=3)).__enter__()
     with Session(smoke, evaluation(), tmp_path).running(restart=True):
@@ -203,17 +197,10 @@ def test_a_person_flies_to_the_goal_by_keys_and_report_has_the_rate(browser, smo
     one = Selection(modalities=("image",), limit=1, seed=7)  # 13 actions, of 6 kinds
     (row,) = select(smoke, one).to_pylist()
     routes = reference_actions(open_root(smoke), row["scene"], (row["subset"],), "agent_action")
-    command = [sys.executable, "-m", "aerialdojo_gen.cli", "fly", "--name", "pilot-1", "--out", str(tmp_path),
-               "--data", str(smoke), "--modality", "image", "--limit=1", "--seed=7", "--no-browser"]  # fmt: skip
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
-    try:
-        url = re.search(r"http://127\.0\.0\.1:\d+/", process.stdout.readline())[0]
-        follow(browser, url, row, routes[row["nav_id"]])
-    finally:
-        process.send_signal(signal.SIGINT)
-        out, _ = process.communicate(timeout=60)
-    assert process.returncode == 0
-    assert "1 flown, success rate 100.0%" in out
+    of = ("--data", smoke, "--modality", "image", "--limit", 1, "--seed", 7)
+    with serving("fly", "--name", "pilot-1", "--out", tmp_path, *of) as page:
+        follow(browser, page.url, row, routes[row["nav_id"]])
+    assert "1 flown, success rate 100.0%" in page.out
     told = called("report", "human-pilot-1", "--log", tmp_path, "--data", smoke)
     assert re.search(r"human:pilot-1 .*100\.0", told.stdout), told
 

@@ -2,15 +2,12 @@
 
 import json
 import os
-import re
-import subprocess
-import sys
 import urllib.request
 
 import pytest
 from selenium.webdriver import ActionChains
 from support.browser import errors, until
-from support.command_line import called
+from support.pages import serving
 
 PLAN = """\
 plan = 1
@@ -27,17 +24,12 @@ place = [["bench", 0, 0, 90], ["tractor", 8, 8]]
 
 
 @pytest.fixture(scope="module")
-def watched(project, tmp_path_factory):
+def watched(tmp_path_factory):
     """The command's address, and the plan that it watches."""
     plan = tmp_path_factory.mktemp("watched") / "U_Yard_0.toml"
     plan.write_text(PLAN)
-    command = [sys.executable, "-m", "aerialdojo_gen.cli", "build-scenes", "--watch", str(plan), "--no-browser"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=project) as process:
-        try:
-            line = process.stdout.readline()
-            yield re.search(r"http://127\.0\.0\.1:\d+/", line)[0], plan
-        finally:
-            process.kill()
+    with serving("build-scenes", "--watch", plan) as page:
+        yield page.url, plan
 
 
 def read(url):
@@ -72,13 +64,6 @@ def test_a_saved_plan_is_built_again_and_a_broken_one_keeps_the_last_scene(watch
     assert read(f"{url}api/scene") != payload
     plan.unlink()
     assert "U_Yard_0.toml" in json.loads(read(f"{url}api/state"))["error"]
-
-
-def test_a_file_that_does_not_exist_is_named(tmp_path):
-    done = called("build-scenes", "--watch", tmp_path / "U_Nil_0.toml")
-    assert done.returncode == 2
-    assert "U_Nil_0.toml" in done.stderr
-    assert "Traceback" not in done.stderr
 
 
 def test_the_page_shows_the_scene_again_with_the_same_camera(browser, watched):

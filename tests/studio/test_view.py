@@ -5,8 +5,6 @@ import re
 import signal
 import socket
 import struct
-import subprocess
-import sys
 from collections import Counter
 from pathlib import Path
 from urllib.parse import urlsplit
@@ -19,8 +17,8 @@ from fastapi import Response
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from starlette.testclient import TestClient
+from support.pages import YARD, serving
 from support.rendered import MATERIALS, block
-from support.viewing import YARD
 
 from aerialdojo_gen.base.errors import StoreError, UsageError
 from aerialdojo_gen.base.pictures import decode_rgb
@@ -29,8 +27,8 @@ from aerialdojo_gen.dataset.release import open_release
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.studio.view.scenes import route_detail, route_points, scene_index
 from aerialdojo_gen.studio.view.server import view_app
-from aerialdojo_gen.studio.web import serving
 from aerialdojo_gen.studio.web.payload import scene_payload
+from aerialdojo_gen.studio.web.serving import local_app, open_socket
 
 SCENE = f"/scenes/{YARD}/"
 
@@ -48,41 +46,33 @@ def unpacked(payload):
     for group in header["groups"]:
         position = array(group["position"], "<f4").reshape(-1, 3)
         index = array(group["index"], "<u4").reshape(-1, 3)
-        look = array(group["colour"], np.uint8).reshape(-1, 4)[:, :3] if "colour" in group else None
-        if look is None:
+        ranges = array(group["ranges"], "<u4").reshape(-1, 3)
+        assert [*ranges[:, 1], len(index)] == [0, *np.cumsum(ranges[:, 2])]
+        if "colour" in group:
+            looks = map(tuple, array(group["colour"], np.uint8).reshape(-1, 4)[index[:, 0], :3])
+        else:
             uvl = array(group["uv"], "<f4").reshape(-1, 3)
-            layers = [cv2.imdecode(array(v, np.uint8), cv2.IMREAD_COLOR)[..., ::-1] for v in group["layers"]]
-        covered = 0
-        for node, first, count in array(group["ranges"], "<u4").reshape(-1, 3):
-            assert first == covered
-            covered += count
-            for corners in index[first : first + count]:
-                if look is not None:
-                    key = tuple(look[corners[0]])
-                else:
-                    key = (layers[int(uvl[corners[0], 2])].tobytes(), tuple(map(tuple, uvl[corners, :2])))
-                triangles.setdefault(header["nodes"][node]["node"], []).append(
-                    (key, tuple(position[corners].ravel()))
-                )
-        assert covered == len(index)
-    return header, {node: Counter(found) for node, found in triangles.items()}
+            layers = [
+                cv2.imdecode(array(v, np.uint8), cv2.IMREAD_COLOR)[..., ::-1].tobytes() for v in group["layers"]
+            ]
+            looks = ((layers[int(uvl[c[0], 2])], tuple(map(tuple, uvl[c, :2]))) for c in index)
+        for node, look, corners in zip(np.repeat(ranges[:, 0], ranges[:, 2]), looks, position[index], strict=True):
+            triangles.setdefault(header["nodes"][node]["node"], Counter())[look, tuple(corners.ravel())] += 1
+    return header, triangles
 
 
 def expected(scene):
     found = {}
-    for item in scene.instances:
-        rows = found.setdefault(item.node, [])
-        for part in item.parts:
-            material = scene.materials[part.material]
-            for face in part.faces:
+    for item, part in ((one, part) for one in scene.instances for part in one.parts):
+        material = scene.materials[part.material]
+        for face in part.faces:
+            look = tuple(material.colour)
+            if material.texture is not None:
                 uv = part.uv[face].astype(np.float32) * np.float32([1, -1])
-                key = (
-                    tuple(material.colour)
-                    if material.texture is None
-                    else (material.texture.tobytes(), tuple(map(tuple, uv)))
-                )
-                rows.append((key, tuple(part.vertices[face].astype(np.float32).ravel())))
-    return {node: Counter(rows) for node, rows in found.items()}
+                look = (material.texture.tobytes(), tuple(map(tuple, uv)))
+            corners = tuple(part.vertices[face].astype(np.float32).ravel())
+            found.setdefault(item.node, Counter())[look, corners] += 1
+    return found
 
 
 corner = st.tuples(*[st.floats(-50, 50, width=32).map(float)] * 3)
@@ -142,7 +132,7 @@ def test_every_answer_has_the_security_headers(client):
 
 
 def test_large_bodies_are_refused_before_they_are_read():
-    app = serving.local_app("view.html", "x", max_body_bytes=1000)
+    app = local_app("view.html", "x", max_body_bytes=1000)
 
     @app.post("/api/size")
     def size() -> Response:
@@ -285,15 +275,15 @@ def test_what_is_not_there_is_named_or_refused(smoke, client, release, tmp_path)
         answer = client.get(path)
         assert (answer.status_code, why in answer.json()["error"]) == (status, True), answer.text
     # Of several scenes those alone that are shown.
-    one = TestClient(view_app(smoke, YARD), base_url="http://127.0.0.1")
+    one = TestClient(view_app(smoke, [YARD]), base_url="http://127.0.0.1")
     assert [scene["scene"] for scene in one.get("/api/release").json()["scenes"]] == [YARD]
     assert {task["scene"] for task in asked(one, most=200)["tasks"]} == {YARD}
     other = next(name for name in release.scenes if name != YARD)
     assert one.get(f"/scenes/{other}/api/index").status_code == 404
     with pytest.raises(UsageError, match="did you mean 'U_Courtyard_0'"):
-        view_app(smoke, "U_Courtyard0")
+        view_app(smoke, ["U_Courtyard0"])
     with pytest.raises(StoreError, match="there is no release in"):
-        view_app(tmp_path, YARD)
+        view_app(tmp_path, [YARD])
 
 
 # ---- the command ----
@@ -305,7 +295,7 @@ def test_a_taken_port_is_named():
         other.listen()
         port = other.getsockname()[1]
         with pytest.raises(UsageError, match=f"port {port}: Address already in use; leave --port out"):
-            serving.open_socket(port)
+            open_socket(port)
 
 
 def test_the_server_listens_on_the_loopback_alone(view_url):
@@ -317,18 +307,14 @@ def test_the_server_listens_on_the_loopback_alone(view_url):
 
 @pytest.mark.kill
 def test_an_ignored_ctrl_c_stays_ignored_and_a_termination_is_a_plain_end(smoke):
-    command = [sys.executable, "-m", "aerialdojo_gen.cli", "view", "--scene", YARD, "--data", str(smoke),
-               "--no-browser"]  # fmt: skip
-    process = subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_IGN),
-    )  # fmt: skip
-    url = re.fullmatch(rf"{YARD}: (http://127\.0\.0\.1:\d+{SCENE})  \(Ctrl-C .*\)\n", process.stdout.readline())
-    with urlopen(url[1], timeout=60) as answer:
-        assert answer.status == 200
-    # Its handlers are there once it answers.
-    ignored = re.search(r"SigIgn:\s*([0-9a-f]+)", Path(f"/proc/{process.pid}/status").read_text())[1]
-    assert int(ignored, 16) >> (signal.SIGINT - 1) & 1
-    process.send_signal(signal.SIGTERM)
-    _, err = process.communicate(timeout=60)
-    assert (process.returncode, err) == (-signal.SIGTERM, "")
+    asked = ("view", "--scene", YARD, "--data", smoke)
+    with serving(*asked, preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_IGN)) as page:
+        assert re.fullmatch(rf"{YARD}: http://127\.0\.0\.1:\d+{SCENE}  \(Ctrl-C .*\)\n", page.line)
+        with urlopen(page.url, timeout=60) as answer:
+            assert answer.status == 200
+        # Its handlers are there once it answers.
+        ignored = re.search(r"SigIgn:\s*([0-9a-f]+)", Path(f"/proc/{page.process.pid}/status").read_text())[1]
+        assert int(ignored, 16) >> (signal.SIGINT - 1) & 1
+        page.process.send_signal(signal.SIGTERM)
+        assert page.process.wait(60) == -signal.SIGTERM
+        assert page.process.stderr.read() == ""

@@ -9,10 +9,11 @@ import pytest
 from selenium.webdriver import ActionChains
 from selenium.webdriver.common.keys import Keys
 from support.browser import errors, until
-from support.viewing import YARD, draw, ready, texts
+from support.pages import YARD, draw, ready, texts
 
 from aerialdojo_gen.base.pictures import decode_rgb
 from aerialdojo_gen.dataset.release import open_release
+from aerialdojo_gen.store.schemas import ACTION_NAMES
 
 
 @pytest.fixture(scope="module")
@@ -139,20 +140,32 @@ def test_the_panel_begins_at_its_top(yard):
 # ---- flying along ----
 
 
-def test_a_flight_passes_between_poses_and_keeps_to_its_speed(smoke, yard):
+def test_a_flight_looks_as_the_drone_looks_passes_between_poses_and_keeps_to_its_speed(smoke, yard, view_url):
     row = open_release(smoke).routes(scene=YARD).to_pylist()[5]
-    yard.execute_async_script("page.pickRoute(arguments[0], true).then(arguments[1])", row["nav_id"])
-    yard.execute_script("page.ride(true)")
+    # The address of a route opens it.
+    yard.get(f"{view_url}scenes/{YARD}/#route={row['nav_id']}")
+    yard.refresh()
+    ready(yard)
+    assert texts(yard, "#picked-route") == [row["nav_id"]]
+    yard.execute_script("document.getElementById('ride').click()")
+    middle = len(row["action"]) // 2
+    yard.execute_script(
+        "const s = document.getElementById('step'); s.value = arguments[0]; s.dispatchEvent(new Event('input'))",
+        middle,
+    )
+    assert texts(yard, "#doing")[0].startswith(ACTION_NAMES[row["action"][middle]])
+    assert yard.execute_script("return page.view.camera.fov") == 90
     poses = np.column_stack([row[key] for key in ("x_m", "y_m", "z_m", "yaw_rad")])
     times = np.array(yard.execute_script("return page.flight.times"))
     assert (np.diff(times) > 0).all()
-    # Half-way between two poses, the camera is half-way, and half turned the shorter way.
+    # Half-way between two poses, the camera is half-way, and half turned the shorter way; it looks level.
     camera = (
         "page.flight.time = arguments[0]; page.flight.now(); const c = page.view.camera; c.updateMatrixWorld();"
-        "const e = c.matrixWorld.elements; return [...c.position.toArray(), -e[8], -e[9]]"
+        "const e = c.matrixWorld.elements; return [...c.position.toArray(), -e[8], -e[9], -e[10]]"
     )
     for k in range(0, len(poses) - 1, 3):
-        x, y, z, ahead_x, ahead_y = yard.execute_script(camera, (times[k] + times[k + 1]) / 2)
+        x, y, z, ahead_x, ahead_y, ahead_z = yard.execute_script(camera, (times[k] + times[k + 1]) / 2)
+        assert ahead_z == pytest.approx(0.0, abs=1e-3)
         assert [x, y, z] == pytest.approx((poses[k, :3] + poses[k + 1, :3]) / 2, abs=2e-3)
         turn = np.angle(np.exp(1j * (poses[k + 1, 3] - poses[k, 3])))
         heading = np.arctan2(ahead_y, ahead_x)
@@ -200,6 +213,7 @@ def test_a_flight_passes_between_poses_and_keeps_to_its_speed(smoke, yard):
     yard.execute_script("page.flight.speed = 8; page.flight.play()")
     until("the end", lambda: not yard.execute_script("return page.flight.playing"))
     assert yard.execute_script("return document.getElementById('step').value") == str(len(poses) - 1)
+    assert yard.execute_script("page.letGo(); return page.view.camera.fov") == 60
     assert errors(yard) == []
 
 

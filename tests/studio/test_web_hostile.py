@@ -4,9 +4,7 @@ import contextlib
 import http.client
 import json
 import resource
-import signal
 import socket
-import subprocess
 import sys
 import time
 from pathlib import Path
@@ -14,10 +12,9 @@ from typing import NamedTuple
 from urllib.parse import urlsplit
 
 import pytest
-from support import annotating
 from support.browser import until
 from support.command_line import called
-from support.viewing import YARD
+from support.pages import YARD, serving, yard_in
 
 from aerialdojo_gen.studio.web.limits import MAX_PER_CLIENT
 
@@ -70,21 +67,19 @@ def started(project, tmp_path_factory):
     It waits 2 s in place of 10 s for the rest of a request's head.
     """
     folder = tmp_path_factory.mktemp("hostile")
-    place, log = annotating.yard_in(project, folder), folder / "log.txt"
-    with log.open("wb") as file:
-        process = subprocess.Popen(
-            [sys.executable, "-c", IMPATIENT, *annotating.command_of(place, "--host", "0.0.0.0")], cwd=project,
-            stdout=subprocess.PIPE, stderr=file, text=True,
-            preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_NOFILE, (256, 256)),
-        )  # fmt: skip
-    try:
-        address, _, token = process.stdout.readline().split()[3].partition("?token=")
-        server = Server(urlsplit(address).port, f"aerialdojo-annotate={token}")
-        yield Desk(server, token, place.annotations, log)
-        assert process.poll() is None
-    finally:
-        process.send_signal(signal.SIGINT)
-        process.communicate(timeout=30)
+    place, log = yard_in(project, folder), folder / "log.txt"
+
+    def few_files():
+        resource.setrlimit(resource.RLIMIT_NOFILE, (256, 256))
+
+    asked = (*place.command, "--host", "0.0.0.0")
+    with (
+        log.open("wb") as file,
+        serving(*asked, program=("-c", IMPATIENT), stderr=file, preexec_fn=few_files) as page,
+    ):
+        token = page.url.partition("?token=")[2]
+        yield Desk(Server(urlsplit(page.url).port, f"aerialdojo-annotate={token}"), token, place.annotations, log)
+        assert page.process.poll() is None
 
 
 @pytest.fixture

@@ -6,12 +6,12 @@ import contextlib
 import os
 import shutil
 import tempfile
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
 import pytest
+from support import chores
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 DRIVER = shutil.which("chromedriver")
@@ -67,13 +67,12 @@ def until(what: str, test: Callable[[], Any], seconds: float = 60.0) -> Any:
         exceptions.NoSuchElementException, exceptions.StaleElementReferenceException,
         exceptions.ElementNotInteractableException,
     )  # fmt: skip
-    end = time.monotonic() + seconds
-    while True:
+
+    def tried() -> Any:
         with contextlib.suppress(*not_yet):
-            if found := test():
-                return found
-        assert time.monotonic() < end, f"{what}: not within {seconds} s"
-        time.sleep(0.05)
+            return test()
+
+    return chores.until(tried, seconds, f"{what}: not within {seconds} s")
 
 
 def errors(driver: Any) -> list[str]:

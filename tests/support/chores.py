@@ -137,12 +137,13 @@ def keep_until_the_end(chore):
     return chore.number
 
 
-def until(true, seconds=60.0):
+def until(true, seconds=60.0, why="it did not come to it"):
+    """Wait until a function gives something true, and give it."""
     end = time.monotonic() + seconds
-    while not true():
-        if time.monotonic() > end:
-            raise AssertionError("it did not come to it")
+    while not (found := true()):
+        assert time.monotonic() < end, why
         time.sleep(0.02)
+    return found
 
 
 def until_empty(session):

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import math
 
-from support.handmade import write_rows, write_scene, xyz
+from support.handmade import job_of, write_rows, write_scene, xyz
 from support.rendered import courtyard
 
 from aerialdojo_gen.base.config.pipeline import Pipeline
 from aerialdojo_gen.base.config.sections import RenderConfig
-from aerialdojo_gen.base.config.shared import Embodiment
 from aerialdojo_gen.pipeline import runner
 from aerialdojo_gen.pipeline.options import RunOptions
 from aerialdojo_gen.pipeline.registry import BY_NAME
-from aerialdojo_gen.pipeline.stage import Job, ProjectPaths
 from aerialdojo_gen.pipeline.stages.work import render
 from aerialdojo_gen.rendering.sample import n_parts
 from aerialdojo_gen.store import schemas
@@ -68,8 +66,7 @@ def write_inputs(data, bad=BAD, n_long=10):
 
 def run_all(data, config, stage=render, name="render"):
     parts = n_parts(data, SCENE, config) if name == "render" else 1
-    roots = ProjectPaths(data=data, scene_assets=data, recipes=data, annotations=data)
-    outputs = [stage.run(Job(name, SCENE, k, parts, 0, Embodiment(), roots), config) for k in range(parts)]
+    outputs = [stage.run(job_of(name, data, SCENE, k, parts), config) for k in range(parts)]
     for output in outputs:
         for table, rows in output.tables.items():
             check_table(store.LAYOUT[table].spec, rows)
@@ -78,11 +75,9 @@ def run_all(data, config, stage=render, name="render"):
 
 def run_whole(data, config, workers=1, reporter=None, **options):
     """Run the stage as the command does."""
-    roots = ProjectPaths(data=data, scene_assets=data, recipes=data, annotations=data)
-    pipeline = Pipeline(render=config)
-    return runner.run(
-        [BY_NAME["render"]], [SCENE], pipeline, roots, options=RunOptions(workers, **options), reporter=reporter
-    )
+    options, roots = RunOptions(workers, **options), job_of("render", data, SCENE).roots
+    stages, pipeline = [BY_NAME["render"]], Pipeline(render=config)
+    return runner.run(stages, [SCENE], pipeline, roots, options=options, reporter=reporter)
 
 
 def files_of(data):

@@ -55,7 +55,8 @@ def is_shell(block: Block) -> bool:
     """Whether a block is of commands: fenced as such, or indented with a line that begins with a program's name."""
     if block.language in ("sh", "bash", "shell", "console"):
         return True
-    return block.language == "indented" and any(_program(line) for line in block.text.splitlines())
+    words = (_bare(line).partition(" ")[0] for line in block.text.splitlines())
+    return block.language == "indented" and any(word in PROGRAMS for word in words)
 
 
 def commands(block: Block) -> Iterator[str]:
@@ -63,9 +64,8 @@ def commands(block: Block) -> Iterator[str]:
     for line in block.text.replace("\\\n", " ").splitlines():
         words = shlex.split(re.sub(r"(^|\s)#\s.*$", "", line))
         for part in shlex.join(words).split(" '&&' ") if words else ():
-            yield part.removeprefix(".venv/bin/").removeprefix("/opt/ad/bin/")
+            yield _bare(part)
 
 
-def _program(line: str) -> bool:
-    first = line.removeprefix(".venv/bin/").removeprefix("/opt/ad/bin/").partition(" ")[0]
-    return first in PROGRAMS
+def _bare(line: str) -> str:
+    return line.removeprefix(".venv/bin/").removeprefix("/opt/ad/bin/")

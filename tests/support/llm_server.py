@@ -1,4 +1,4 @@
-"""A server on 127.0.0.1 that speaks OpenAI's chat protocol and Anthropic's messages protocol, and errs on demand."""
+"""A server on 127.0.0.1 that speaks OpenAI's chat protocol and Anthropic's, and errs on demand; its agents."""
 
 from __future__ import annotations
 
@@ -9,6 +9,13 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
+
+import numpy as np
+
+from aerialdojo_gen.benchmark.agents import load_agent
+from aerialdojo_gen.benchmark.agents.goal import Goal, Observation, Rules
+from aerialdojo_gen.benchmark.llm.agent import LanguageModelAgent
+from aerialdojo_gen.store.schemas import ACTION_NAMES
 
 MOVE = '{"thought": "Nothing here.", "action": "MoveForward3"}'
 
@@ -26,11 +33,13 @@ class Call:
     """A tool call: the model answers by arguments."""
 
     arguments: str
+    usage = (1000, 20)
 
 
-@dataclass(frozen=True)
 class Filtered:
     """A content filter has taken the answer away."""
+
+    usage = (1000, 20)
 
 
 @dataclass(frozen=True)
@@ -59,22 +68,18 @@ class Endless:
     code: int = 200
 
 
-@dataclass(frozen=True)
 class Drip:
     """A byte now and then, for ever: no single read takes long."""
 
 
-@dataclass(frozen=True)
 class Trickle:
     """Headers of 8 bytes every 20 ms: no single read takes long."""
 
 
-@dataclass(frozen=True)
 class Hang:
     """No answer at all."""
 
 
-@dataclass(frozen=True)
 class Cut:
     """The connection is cut in the middle of an answer."""
 
@@ -94,9 +99,6 @@ class Service:
     checks: list[dict[str, Any]] = field(default_factory=list)  # The requests of checks before a run
     refuses: Callable[[dict[str, Any]], Act | None] | None = None  # Answers a check by its body
 
-    def next(self) -> Act:
-        return self.script.pop(0) if len(self.script) > 1 else self.script[0]
-
 
 class _Handler(BaseHTTPRequestHandler):
     protocol_version = "HTTP/1.1"
@@ -109,11 +111,12 @@ class _Handler(BaseHTTPRequestHandler):
         if "This is a test of the connection" in json.dumps(body):
             self.service.checks.append(seen)
             refuses = self.service.refuses
-            act: Act = (refuses(body) if refuses else None) or _checked(body)
+            answer = (Call if "tools" in body else Say)('{"thought": "a test", "action": "Stop"}')
+            act: Act = (refuses(body) if refuses else None) or answer
         else:
             self.service.requests.append(seen)
-            policy = self.service.policy
-            said = policy(body) if policy else self.service.next()
+            policy, script = self.service.policy, self.service.script
+            said = policy(body) if policy else script.pop(0) if len(script) > 1 else script[0]
             act = Say(said) if isinstance(said, str) else said
         with contextlib.suppress(BrokenPipeError, ConnectionResetError):
             self.play(act, anthropic=self.path == "/v1/messages")
@@ -129,11 +132,7 @@ class _Handler(BaseHTTPRequestHandler):
         elif isinstance(act, Raw):
             self.send(act.code, act.body, {"content-type": act.content_type})
         elif isinstance(act, Cut):
-            self.send_response(200)
-            self.send_header("content-type", "application/json")
-            self.send_header("content-length", "1000")
-            self.end_headers()
-            self.wfile.write(b'{"id": "x", ')
+            self.send(200, b'{"id": "x", ', {"content-length": "1000"})
             self.close_connection = True
         elif isinstance(act, Trickle):
             self.wfile.write(b"HTTP/1.1 200 OK\r\n")
@@ -158,19 +157,14 @@ class _Handler(BaseHTTPRequestHandler):
 
     def send(self, code: int, body: bytes, headers: dict[str, str] | None = None) -> None:
         self.send_response(code)
-        for name, value in ({"content-type": "application/json"} | (headers or {})).items():
+        usual = {"content-type": "application/json", "content-length": str(len(body))}
+        for name, value in (usual | (headers or {})).items():
             self.send_header(name, value)
-        self.send_header("content-length", str(len(body)))
         self.end_headers()
         self.wfile.write(body)
 
     def log_message(self, format: str, *args: Any) -> None:
         """Say nothing on stderr."""
-
-
-def _checked(body: dict[str, Any]) -> Act:
-    answer = '{"thought": "a test", "action": "Stop"}'
-    return Call(answer) if "tools" in body else Say(answer)
 
 
 def _completion(said: Say | Call | Filtered) -> bytes:
@@ -183,9 +177,9 @@ def _completion(said: Say | Call | Filtered) -> bytes:
         "id": "chatcmpl-1", "object": "chat.completion", "created": 1, "model": "m",
         "choices": [{"index": 0, "message": message, "finish_reason": reason}],
     }  # fmt: skip
-    usage = said.usage if isinstance(said, Say) else (1000, 20)
-    if usage:
-        value["usage"] = {"prompt_tokens": usage[0], "completion_tokens": usage[1], "total_tokens": sum(usage)}
+    if said.usage:
+        into, out = said.usage
+        value["usage"] = {"prompt_tokens": into, "completion_tokens": out, "total_tokens": into + out}
     return json.dumps(value).encode()
 
 
@@ -199,9 +193,8 @@ def _message(said: Say | Call | Filtered) -> bytes:
         "id": "msg_1", "type": "message", "role": "assistant", "model": "m", "stop_reason": "end_turn",
         "stop_sequence": None, "content": content,
     }  # fmt: skip
-    usage = said.usage if isinstance(said, Say) else (1000, 20)
-    if usage:
-        value["usage"] = {"input_tokens": usage[0], "output_tokens": usage[1]}
+    if said.usage:
+        value["usage"] = dict(zip(("input_tokens", "output_tokens"), said.usage, strict=True))
     return json.dumps(value).encode()
 
 
@@ -222,3 +215,34 @@ def serving(*script: Act) -> Iterator[Service]:
         server.shutdown()
         server.server_close()
         thread.join()
+
+
+KEY = "sk-test-51f0c1e7a9b24d6e8f30"
+FORWARD_3 = ACTION_NAMES.index("MoveForward3")
+PROTOCOLS = ["openai", "anthropic"]
+
+
+def agent_of(protocol: str, service: Service, **options: Any) -> LanguageModelAgent:
+    base_url = service.url + ("/v1" if protocol == "openai" else "")
+    given = {"model": "m", "base_url": base_url, "timeout_s": 5.0, "request_retries": 0} | options
+    agent = load_agent(protocol, **given)
+    assert isinstance(agent, LanguageModelAgent)
+    return agent
+
+
+def goal_for(agent: LanguageModelAgent, image: bool = False) -> Goal:
+    picture = np.full((8, 8, 3), 200, np.uint8) if image else None
+    kind, text = ("image", None) if image else ("semantic", "A van.")
+    return Goal(kind, "red van", "clock tower", "north", text, picture, Rules(90, sensors=agent.sensors))
+
+
+def observation(step: int = 0, views: tuple[str, ...] = ("front",)) -> Observation:
+    rgb = {view: np.full((64, 64, 3), 40 * k, np.uint8) for k, view in enumerate(views)}
+    depth = {view: np.full((64, 64), 10.0 + k, np.float32) for k, view in enumerate(views)}
+    return Observation(step, 90 - step, False, rgb, depth)
+
+
+def begun(protocol: str, service: Service, **options: Any) -> LanguageModelAgent:
+    agent = agent_of(protocol, service, **options)
+    agent.reset(goal_for(agent))
+    return agent

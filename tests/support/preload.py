@@ -8,15 +8,21 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import json
 import os
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import pytest
+from support.chores import until_empty
+
+ROOT = Path(__file__).resolve().parents[2]
 
 SOURCE = r"""
 #define _GNU_SOURCE
@@ -156,38 +162,76 @@ def preloaded(**variables: str) -> dict[str, str]:
     return os.environ | {"LD_PRELOAD": str(library())} | {f"PRELOAD_{name}": v for name, v in variables.items()}
 
 
-# A child for each line of the input, which says at which call it is killed; the imports are made once.
-_FORKING = """
-import os, sys
-import aerialdojo_gen.store.atomic
-for line in sys.stdin:
-    number, sys.argv[1] = line.rstrip("\\n").split(" ", 1)
+_SERVER = """
+import json, os, sys, traceback
+exec(sys.argv[1], {})
+for line in iter(sys.stdin.readline, ""):
+    arguments, environment, output = json.loads(line)
     child = os.fork()
     if not child:
-        os.environ["PRELOAD_KILL_AT"] = number
-        exec(sys.argv[2], {})
-        os._exit(0)
+        os.setsid()
+        os.environ.update(environment)
+        os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
+        if output:
+            os.dup2(os.open(output, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), 2)
+        os.dup2(2, 1)
+        program, sys.argv[:] = sys.argv[2], ["aerialdojo-gen", *arguments]
+        try:
+            exec(program, {})
+            code = 0
+        except SystemExit as ended:
+            code = ended.code if isinstance(ended.code, int) else bool(ended.code)
+        except BaseException:
+            traceback.print_exc()
+            code = 70
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(code)
+    print(child, flush=True)
+    sys.stdin.readline()
     print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
 """
 
 
+class ForkServer:
+    """A process with the library that imports once what a program needs, and runs it in children of its own."""
+
+    def __init__(self, imports: str, program: str, **variables: str) -> None:
+        path = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
+        self._process = subprocess.Popen(
+            [sys.executable, "-c", _SERVER, imports, program], cwd=ROOT, text=True, stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE, env=preloaded(**variables) | {"PYTHONPATH": path},
+        )  # fmt: skip
+
+    def run(
+        self, arguments: Sequence[object], env: Mapping[str, str], said: Path | None = None, kill_after: float = -1.0
+    ) -> int:
+        """Run the program in a session of its own; returns its exit status, negative for a signal."""
+        asked = [[*map(str, arguments)], dict(env), said and str(said)]
+        print(json.dumps(asked), file=self._process.stdin, flush=True)
+        session = int(self._process.stdout.readline())
+        if kill_after >= 0:
+            # The server reaps it when it is asked to go on: until then its number is nobody else's.
+            time.sleep(kill_after)
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(session, signal.SIGKILL)
+        print(file=self._process.stdin, flush=True)
+        code = int(self._process.stdout.readline())
+        until_empty(session)
+        return code
+
+    def close(self) -> None:
+        self._process.stdin.close()
+        self._process.wait()
+
+
 @contextlib.contextmanager
-def killed_at(program: str, **variables: str) -> Iterator[Callable[[int, Path], int]]:
+def killed_at(
+    program: str, imports: str = "import aerialdojo_gen.store.atomic", **variables: str
+) -> Iterator[Callable[[int, Path], int]]:
     """Yield a function of n and a folder: run a program on it, killed at its n-th call; gives its exit status."""
-    with subprocess.Popen(
-        [sys.executable, "-c", _FORKING, "", program], env=preloaded(**variables), text=True,
-        stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-    ) as process:  # fmt: skip
-        assert process.stdin is not None
-        assert process.stdout is not None
-        given, answers = process.stdin, process.stdout
-
-        def run(n: int, folder: Path) -> int:
-            print(n, folder, file=given, flush=True)
-            return int(answers.readline())
-
-        yield run
-        given.close()
+    with contextlib.closing(ForkServer(imports, program, **variables)) as server:
+        yield lambda n, folder: server.run([folder], {"PRELOAD_KILL_AT": str(n)})
 
 
 def unshared(*namespaces: str) -> list[str]:

@@ -1,19 +1,19 @@
-"""A real S3 server on loopback, and a proxy before it that answers with faults."""
+"""A real S3 server on loopback, a proxy before it that answers with faults, and files in data roots."""
 
 from __future__ import annotations
 
 import contextlib
 import functools
+import http.client
 import re
 import shutil
 import socket
-import subprocess
-import sys
 import threading
 import time
-import urllib.request
 from collections.abc import Iterable, Iterator
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from typing import Any
 
 import botocore.session
 
@@ -34,24 +34,13 @@ def forget_clients() -> None:
 
 @contextlib.contextmanager
 def s3_server() -> Iterator[str]:
-    """Run moto's server in a process of its own; yields its URL."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
-    program = [sys.executable, "-m", "moto.server", "-H", "127.0.0.1", "-p", str(port)]
-    server = subprocess.Popen(program, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    url = f"http://127.0.0.1:{port}"
-    try:
-        for _ in range(600):
-            with contextlib.suppress(OSError):
-                urllib.request.urlopen(url, timeout=1).close()
-                break
-            assert server.poll() is None, "moto's server ended"
-            time.sleep(0.05)
-        yield url
-    finally:
-        server.kill()
-        server.wait()
+    """Run moto's server in threads of this process; yields its URL."""
+    from moto.server import ThreadedMotoServer
+
+    server = ThreadedMotoServer("127.0.0.1", 0, verbose=False)
+    server.start()
+    yield "http://{}:{}".format(*server.get_host_and_port())
+    server.stop()
 
 
 def upload(root: DataRoot, data: Path, folders: Iterable[str]) -> None:
@@ -70,13 +59,13 @@ class Proxy:
     """
 
     def __init__(self, server: str) -> None:
-        self._to = int(server.rpartition(":")[2])
-        self._listener = socket.create_server(("127.0.0.1", 0))
-        self.url = f"http://127.0.0.1:{self._listener.getsockname()[1]}"
+        self._to = server.removeprefix("http://")
         self._rules: list[list] = []
         self.seen: list[str] = []
         self._lock = threading.Lock()
-        threading.Thread(target=self._serve, daemon=True).start()
+        self._server = ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(_Handler, self))
+        self.url = f"http://127.0.0.1:{self._server.server_port}"
+        threading.Thread(target=self._server.serve_forever, daemon=True).start()
 
     def fail(self, pattern: str, how: int | str | float, times: int = 1) -> None:
         """Let requests whose first line matches fail."""
@@ -88,83 +77,80 @@ class Proxy:
         return sum(rule[2] for rule in self._rules)
 
     def close(self) -> None:
-        self._listener.close()
+        self._server.shutdown()
+        self._server.server_close()
 
-    def _serve(self) -> None:
-        while True:
-            try:
-                client, _ = self._listener.accept()
-            except OSError:
-                return
-            threading.Thread(target=self._client, args=(client,), daemon=True).start()
-
-    def _client(self, client: socket.socket) -> None:
-        with contextlib.suppress(OSError), client:
-            while self._request(client):
-                pass
-
-    def _request(self, client: socket.socket) -> bool:
-        head = _head(client)
-        if not head:
-            return False
-        line = head.split(b"\r\n", 1)[0].decode()
-        self.seen.append(line)
-        how = self._rule(line)
-        if how == "drop":
-            if not line.startswith(("GET", "DELETE", "HEAD")):
-                client.recv(1000)
-            client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, b"\1\0\0\0\0\0\0\0")
-            return False
-        if b"100-continue" in head.lower():
-            client.sendall(b"HTTP/1.1 100 Continue\r\n\r\n")
-            head = re.sub(rb"(?i)\r\nexpect:[^\r]*", b"", head)
-        length = int((re.search(rb"(?i)\r\ncontent-length: *(\d+)", head) or [0, 0])[1])
-        body = _exactly(client, length)
-        if isinstance(how, int):
-            code = {500: "InternalError", 503: "SlowDown"}[how]
-            text = f"<Error><Code>{code}</Code><Message>{code}</Message></Error>".encode()
-            client.sendall(b"HTTP/1.1 %d X\r\nContent-Type: application/xml\r\nContent-Length: %d\r\n\r\n%s"
-                           % (how, len(text), text))  # fmt: skip
-            return True
-        if isinstance(how, float):
-            time.sleep(how)
-        head = re.sub(rb"(?i)\r\nconnection:[^\r]*", b"", head).replace(b"\r\n\r\n", b"\r\nConnection: close\r\n\r\n")
-        with socket.create_connection(("127.0.0.1", self._to)) as server:
-            server.sendall(head + body)
-            answer = b""
-            while block := server.recv(1 << 16):
-                answer += block
-        if how in ("cut", "stall"):
-            answer = answer[: answer.index(b"\r\n\r\n") + 4 + len(answer) // 3]
-        client.sendall(answer)
-        if how == "stall":
-            client.recv(1)  # until the other side gives up
-        return False
-
-    def _rule(self, line: str) -> int | str | float | None:
+    def fault_of(self, line: str) -> int | str | float | None:
         with self._lock:
+            self.seen.append(line)
             for rule in self._rules:
                 if rule[2] and rule[0].search(line):
                     rule[2] -= 1
                     return rule[1]
         return None
 
-
-def _head(client: socket.socket) -> bytes:
-    head = b""
-    while not head.endswith(b"\r\n\r\n"):
-        byte = client.recv(1)
-        if not byte:
-            return b""
-        head += byte
-    return head
+    def forward(self, method: str, path: str, body: bytes, headers: dict[str, str]) -> tuple[int, list, bytes]:
+        with contextlib.closing(http.client.HTTPConnection(self._to, timeout=60)) as server:
+            server.request(method, path, body, headers)
+            answer = server.getresponse()
+            return answer.status, answer.getheaders(), answer.read()
 
 
-def _exactly(client: socket.socket, length: int) -> bytes:
-    body = b""
-    while len(body) < length:
-        block = client.recv(min(1 << 16, length - len(body)))
-        if not block:
-            break
-        body += block
-    return body
+class _Handler(BaseHTTPRequestHandler):
+    protocol_version = "HTTP/1.1"
+
+    def __init__(self, proxy: Proxy, *connection: Any) -> None:
+        self._proxy = proxy
+        with contextlib.suppress(OSError):
+            super().__init__(*connection)
+
+    def log_message(self, *arguments: Any) -> None:
+        """Say nothing on stderr."""
+
+    def _handle(self) -> None:
+        how = self._proxy.fault_of(self.requestline)
+        if how == "drop":
+            if self.command in ("PUT", "POST"):
+                self.rfile.read1(1000)
+            self.connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, b"\1\0\0\0\0\0\0\0")
+            self.connection.close()
+            raise OSError("dropped")
+        body = self.rfile.read(int(self.headers["content-length"] or 0))
+        if isinstance(how, int):
+            code = {500: "InternalError", 503: "SlowDown"}[how]
+            answer = f"<Error><Code>{code}</Code><Message>{code}</Message></Error>".encode()
+            status, headers = how, [("Content-Length", str(len(answer)))]
+        else:
+            time.sleep(how if isinstance(how, float) else 0)
+            kept = {
+                name: value for name, value in self.headers.items() if name.lower() not in ("connection", "expect")
+            }
+            status, headers, answer = self._proxy.forward(self.command, self.path, body, kept)
+        self.send_response_only(status)
+        for name, value in headers:
+            self.send_header(name, value)
+        self.end_headers()
+        broken = how in ("cut", "stall")
+        self.wfile.write(answer[: len(answer) // 3] if broken else answer)
+        if how == "stall":
+            self.connection.recv(1)  # until the other side gives up
+        self.close_connection = self.close_connection or broken
+
+    do_GET = do_HEAD = do_PUT = do_POST = do_DELETE = _handle  # noqa: N815 - as the server calls them
+
+
+def write(root: DataRoot, name: str, data: bytes) -> None:
+    with root.commit(name) as path:
+        path.write_bytes(data)
+
+
+def fill(root: DataRoot, folder: str, files: dict[str, bytes]) -> None:
+    with root.commit_folder(folder) as path:
+        for name, data in files.items():
+            (path / name).parent.mkdir(exist_ok=True)
+            (path / name).write_bytes(data)
+
+
+def read_folder(root: DataRoot, folder: str) -> dict[str, bytes]:
+    here = root.local_copy(folder)
+    return {p.relative_to(here).as_posix(): p.read_bytes() for p in here.rglob("*") if p.is_file()}

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from support.extended import write_viewpoints
 from support.handmade import box, instance, scene, write_rows, write_scene
+from support.planting import write_viewpoints
 
 from aerialdojo_gen.scenes.model import Scene
 

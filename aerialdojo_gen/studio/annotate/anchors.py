@@ -71,8 +71,10 @@ class AnchorService:
 
         key = (entry.id, entry.node)
         if key not in self._candidates:
-            found = self._run(lambda: anchors_of(self._item(entry), self._world.result(), self._job, self.config))
-            self._candidates[key] = found[0]
+            anchors, _ = self._run(
+                lambda: anchors_of(self._item(entry), self._world.result(), self._job, self.config)
+            )
+            self._candidates[key] = anchors
         return self._candidates[key]
 
     def place(self, entry: Object, eye_m: Floats) -> Floats:
@@ -118,12 +120,12 @@ class AnchorService:
         pose = view_pose(pose_m_rad[:3], pose_m_rad[3], "front")
         picture = scene_renderer(self.scene, self._pictures.renderer).render(camera, pose)
         rays = ray_caster(self.scene)
-        shown = instance_map(rays, camera, pose)
-        found, counts = np.unique(shown[shown >= 0], return_counts=True)
+        node_map = instance_map(rays, camera, pose)
+        visible, counts = np.unique(node_map[node_map >= 0], return_counts=True)
         return View(
             encode_png(picture.rgb, REFERENCE_PNG),
-            {rays.nodes[k]: box_of(shown == k) for k in found},
-            {rays.nodes[k]: int(n) for k, n in zip(found, counts, strict=True)},
+            {rays.nodes[k]: box_of(node_map == k) for k in visible},
+            {rays.nodes[k]: int(n) for k, n in zip(visible, counts, strict=True)},
         )
 
     def _item(self, entry: Object) -> dict[str, Any]:

@@ -101,24 +101,23 @@ def find(annotations: Annotations, kind: Kind, entry_id: int) -> tuple[int, Entr
 
 def edits_of(operation: Operation, annotations: Annotations, next_id: int) -> list[Edit]:
     """Turn an operation into edits of the annotations as they are."""
-    model: type[Entry] = Landmark if operation.kind == "landmarks" else Object
-    entries: Sequence[Entry] = getattr(annotations, operation.kind)
+    kind, model = operation.kind, Landmark if operation.kind == "landmarks" else Object
+    before: Entry | None = None
+    after: Entry | None = None
     if isinstance(operation, Add):
-        if len(entries) >= MAX_ENTRIES:
-            raise AerialDojoError(f"there are {len(entries)} {operation.kind} already, the maximum")
+        entry_id, index = next_id, len(getattr(annotations, kind))
+        if index >= MAX_ENTRIES:
+            raise AerialDojoError(f"there are {index} {kind} already, the maximum")
         empty = {key: "" for key in model.model_fields if key not in ("id", "anchor")}
         after = _entry(model, empty | {"id": next_id} | operation.fields.set_values())
-        return [Edit(kind=operation.kind, id=next_id, index=len(entries), before=None, after=after)]
-    found = find(annotations, operation.kind, operation.id)
-    if found is None:
-        raise ConflictError(f"{operation.kind[:-1]} {operation.id} no longer exists")
-    index, before = found
-    if isinstance(operation, Remove):
-        return [Edit(kind=operation.kind, id=operation.id, index=index, before=before, after=None)]
-    after = _entry(model, before.model_dump() | operation.fields.set_values())
-    if after == before:
-        return []
-    return [Edit(kind=operation.kind, id=operation.id, index=index, before=before, after=after)]
+    else:
+        entry_id, match = operation.id, find(annotations, kind, operation.id)
+        if match is None:
+            raise ConflictError(f"{kind[:-1]} {entry_id} no longer exists")
+        index, before = match
+        if isinstance(operation, Change):
+            after = _entry(model, before.model_dump() | operation.fields.set_values())
+    return [] if after == before else [Edit(kind=kind, id=entry_id, index=index, before=before, after=after)]
 
 
 def _entry(model: type[Entry], values: dict[str, Any]) -> Entry:
@@ -147,19 +146,18 @@ def difference(before: Annotations, after: Annotations) -> list[Edit]:
     edits: list[Edit] = []
     kinds: tuple[Kind, ...] = ("landmarks", "objects")
     for kind in kinds:
-        old: Sequence[Entry] = getattr(before, kind)
-        new: Sequence[Entry] = getattr(after, kind)
-        mine, theirs = {e.id: e for e in old}, {e.id: e for e in new}
-        for k in reversed(range(len(old))):
-            if old[k].id not in theirs:
-                edits.append(Edit(kind=kind, id=old[k].id, index=k, before=old[k], after=None))
-        for k, entry in enumerate(new):
-            if mine.get(entry.id) != entry:
-                edits.append(Edit(kind=kind, id=entry.id, index=k, before=mine.get(entry.id), after=entry))
+        old: dict[int, Entry] = {entry.id: entry for entry in getattr(before, kind)}
+        new: dict[int, Entry] = {entry.id: entry for entry in getattr(after, kind)}
+        for k, (entry_id, entry) in reversed([*enumerate(old.items())]):
+            if entry_id not in new:
+                edits.append(Edit(kind=kind, id=entry_id, index=k, before=entry, after=None))
+        for k, (entry_id, entry) in enumerate(new.items()):
+            if old.get(entry_id) != entry:
+                edits.append(Edit(kind=kind, id=entry_id, index=k, before=old.get(entry_id), after=entry))
     return edits
 
 
-def called(kind: str, entry: Entry) -> str:
+def describe_entry(kind: str, entry: Entry) -> str:
     """Name an entry for people."""
     return f"{kind[:-1]} {entry.id}" + (f" ({entry.name})" if entry.name else "")
 
@@ -172,7 +170,7 @@ def describe(edits: Sequence[Edit]) -> str:
     for edit in edits[:3]:
         entry = edit.after or edit.before
         assert entry is not None
-        thing = called(edit.kind, entry)
+        thing = describe_entry(edit.kind, entry)
         if edit.before is None:
             words.append(f"added {thing}")
         elif edit.after is None:

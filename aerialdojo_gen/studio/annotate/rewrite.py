@@ -19,7 +19,7 @@ from pydantic import BaseModel, ConfigDict
 
 from aerialdojo_gen.annotations.check import description_faults
 from aerialdojo_gen.annotations.claims import Claim, SceneClaims
-from aerialdojo_gen.annotations.format import Object, parse_annotations, write_annotations
+from aerialdojo_gen.annotations.format import Object, write_annotations
 from aerialdojo_gen.annotations.matching import Matcher
 from aerialdojo_gen.annotations.phrases import LISTS
 from aerialdojo_gen.annotations.vocabulary import SHADES, Vocabulary
@@ -28,12 +28,13 @@ from aerialdojo_gen.base.errors import AgentUnavailable, AnnotationError, UsageE
 from aerialdojo_gen.base.safe_parse import read_toml
 from aerialdojo_gen.benchmark.agents.base import InvalidAnswer
 from aerialdojo_gen.benchmark.agents.load import load_agent, read_options
-from aerialdojo_gen.benchmark.evaluation import Limits
+from aerialdojo_gen.benchmark.evaluation import BudgetTracker, Limits
 from aerialdojo_gen.benchmark.llm.agent import LanguageModelAgent, Reply
 from aerialdojo_gen.benchmark.llm.answer import read_as
 from aerialdojo_gen.pipeline.stage import ProjectPaths
 from aerialdojo_gen.scenes.build import build_scene
 from aerialdojo_gen.scenes.catalogue import load_catalogue
+from aerialdojo_gen.studio.annotate.storage import parse_whole
 
 _WRITE, _READ = read_toml(Path(__file__).with_name("rewrite.toml"), AnnotationError).values()
 _MAX_RELATIONS, _MAX_PARTS = 4, 2
@@ -92,13 +93,8 @@ class Rewriter:
 
     def estimate(self, objects: Sequence[Object]) -> str:
         """Say about what rewriting costs, before anything is sent."""
-        letters = sum(
-            len(_WRITE["prompt"])
-            + len(_READ["prompt"])
-            + 2 * len(self._question(entry, self._facts(entry)))
-            + 4 * _ANSWER_TOKENS
-            for entry in objects
-        )
+        same = len(_WRITE["prompt"]) + len(_READ["prompt"]) + 4 * _ANSWER_TOKENS
+        letters = sum(same + 2 * len(self._question(entry, self._facts(entry))) for entry in objects)
         into, out = round(letters * _PER_LETTER), 2 * _ANSWER_TOKENS * len(objects)
         cost = self._agent.options.cost_usd(into, out)
         priced = "" if cost is None else f", about ${cost:.2f}"
@@ -112,7 +108,8 @@ class Rewriter:
         done, failures = Rewriting(), 0
         texts: dict[int, str] = {}
         for entry in objects:
-            if failures >= _MAX_FAILURES or self._at_limit(done, limits):
+            cost = self._agent.options.cost_usd(*done.tokens) or 0.0
+            if failures >= _MAX_FAILURES or BudgetTracker(limits, cost, sum(done.tokens)).spent:
                 done.left += 1
                 continue
             try:
@@ -127,11 +124,6 @@ class Rewriter:
                 done.kept += 1
                 texts[entry.id] = text
         return texts, done
-
-    def _at_limit(self, done: Rewriting, limits: Limits) -> bool:
-        cost = self._agent.options.cost_usd(*done.tokens)
-        spent = limits.tokens is not None and sum(done.tokens) >= limits.tokens
-        return spent or (limits.cost_usd is not None and cost is not None and cost >= limits.cost_usd)
 
     def _text(self, entry: Object, done: Rewriting) -> tuple[str, str]:
         """Return a text, and why it is dropped; empty if it is verified."""
@@ -234,10 +226,7 @@ def rewrite_scene(
     path = roots.annotations / f"{name}.json"
     if not path.exists():
         raise AnnotationError(f"{path} does not exist: there is nothing to rewrite")
-    source = parse_annotations(path.read_text(encoding="utf-8"))
-    if source.faults:
-        raise AnnotationError(f"{path}: {source.faults[0]}")
-    annotations, catalogue = source.annotations, load_catalogue(roots.scene_assets)
+    annotations, catalogue = parse_whole(path.read_bytes(), name, str(path)), load_catalogue(roots.scene_assets)
     scene = build_scene(roots.recipes / f"{name}.toml", catalogue)
     for node in (*(m.node for m in annotations.landmarks), *(o.node for o in annotations.objects)):
         if node not in scene:

@@ -16,11 +16,12 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-from fastapi import FastAPI, Header, Query, Request
+from fastapi import Depends, FastAPI, Header, Query, Request
 from fastapi.responses import JSONResponse, PlainTextResponse, RedirectResponse, Response
 from fastapi.staticfiles import StaticFiles
 from pydantic import Field, StrictFloat, StrictStr, field_validator
-from starlette.types import ASGIApp, Receive, Scope, Send
+from starlette.middleware.base import BaseHTTPMiddleware, RequestResponseEndpoint
+from starlette.types import ASGIApp
 
 from aerialdojo_gen.annotations.format import Strict
 from aerialdojo_gen.base.errors import AerialDojoError, AnnotationError, StoreError, UsageError
@@ -36,8 +37,8 @@ MAX_FAILED_LOGINS, SECONDS_PER_FAILED_LOGIN = 10, 6.0
 _MAX_ADDRESSES = 4096
 
 
-class TokenGate:
-    """ASGI middleware: rejects requests without the token.
+class TokenGate(BaseHTTPMiddleware):
+    """Middleware: rejects requests without the token.
 
     The printed address contains the token; the response stores it in an HttpOnly, SameSite cookie and redirects to
     the address without it. Requests whose ``Origin`` does not match their ``Host`` are rejected. An address that sent
@@ -46,43 +47,39 @@ class TokenGate:
     """
 
     def __init__(self, app: ASGIApp, token: str) -> None:
-        self._app, self._token = app, token
+        super().__init__(app)
+        self._token = token
         self._failed_logins: OrderedDict[str, _FailedLogins] = OrderedDict()
         self._known: set[str] = set()
 
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+    async def dispatch(self, request: Request, call_next: RequestResponseEndpoint) -> Response:
         """Answer 401, 403, 429 or 303 itself, or hand the request on."""
-        if scope["type"] != "http":
-            await self._app(scope, receive, send)
-            return
-        request = Request(scope)
         address = request.client.host if request.client else ""
         failed = self._failed_logins.get(address)
         wait = 0.0 if failed is None else failed.wait(time.monotonic())
         token, cookie = request.query_params.get("token", ""), request.cookies.get(COOKIE, "")
-        answer: Response | None = None
         if wait > 0.0 and address not in self._known:
             seconds = int(wait) + 1
             after = {"retry-after": str(seconds)}
-            answer = PlainTextResponse(f"too many wrong tokens: try again in {seconds} seconds", 429, after)
-        elif scope["path"] == "/" and self._is_token(token):
+            return PlainTextResponse(f"too many wrong tokens: try again in {seconds} seconds", 429, after)
+        if request.scope["path"] == "/" and self._is_token(token):
             self._known.add(address)
             kept = f"{COOKIE}={self._token}; HttpOnly; SameSite=Strict; Path=/"
-            answer = RedirectResponse("/", 303, {"set-cookie": kept})
-        elif not self._is_token(cookie):
-            for given in filter(None, (token, cookie)):
-                self._record_failed_login(address, given)
-            answer = PlainTextResponse("open the address that the command printed; it contains the token", 401)
-        elif request.headers.get("origin") not in (None, f"http://{request.headers.get('host', '')}"):
-            answer = PlainTextResponse("requests from other sites are not allowed", 403)
-        await (answer or self._app)(scope, receive, send)
+            return RedirectResponse("/", 303, {"set-cookie": kept})
+        if not self._is_token(cookie):
+            for secret in filter(None, (token, cookie)):
+                self._record_failed_login(address, secret)
+            return PlainTextResponse("open the address that the command printed; it contains the token", 401)
+        if request.headers.get("origin") not in (None, f"http://{request.headers.get('host', '')}"):
+            return PlainTextResponse("requests from other sites are not allowed", 403)
+        return await call_next(request)
 
-    def _is_token(self, given: str) -> bool:
-        return hmac.compare_digest(given.encode("utf-8", "replace"), self._token.encode())
+    def _is_token(self, secret: str) -> bool:
+        return hmac.compare_digest(secret.encode("utf-8", "replace"), self._token.encode())
 
-    def _record_failed_login(self, address: str, given: str) -> None:
+    def _record_failed_login(self, address: str, secret: str) -> None:
         failed = self._failed_logins.pop(address, None) or _FailedLogins()
-        failed.add(given, time.monotonic())
+        failed.add(secret, time.monotonic())
         self._failed_logins[address] = failed
         while len(self._failed_logins) > _MAX_ADDRESSES:
             self._failed_logins.popitem(last=False)
@@ -95,17 +92,17 @@ class _FailedLogins:
     level: float = 0.0
     since: float = 0.0
     # A tab from before a restart keeps sending its old token: that is no guess.
-    seen: set[str] = field(default_factory=set)
+    digests: set[str] = field(default_factory=set)
 
     def wait(self, now: float) -> float:
         return (self.level - MAX_FAILED_LOGINS + 1) * SECONDS_PER_FAILED_LOGIN - (now - self.since)
 
-    def add(self, given: str, now: float) -> None:
-        digest = hashlib.sha256(given.encode("utf-8", "replace")).hexdigest()
+    def add(self, secret: str, now: float) -> None:
+        digest = hashlib.sha256(secret.encode("utf-8", "replace")).hexdigest()
         left = max(0.0, self.level - (now - self.since) / SECONDS_PER_FAILED_LOGIN)
-        self.seen = self.seen if left > 0.0 else set()
-        self.level, self.since = left + (digest not in self.seen), now
-        self.seen.add(digest)
+        self.digests = self.digests if left > 0.0 else set()
+        self.level, self.since = left + (digest not in self.digests), now
+        self.digests.add(digest)
 
 
 STATIC = Path(__file__).resolve().parent / "static"
@@ -113,8 +110,20 @@ MAX_BYTES = 8 << 20
 
 _Metres = Annotated[StrictFloat, Field(allow_inf_nan=False, ge=-1e5, le=1e5)]
 _Triple = tuple[_Metres, _Metres, _Metres]
-_Match = Annotated[str | None, Header(alias="If-Match", max_length=80)]
 _Object = Annotated[int, Field(ge=0, le=2**31 - 1)]
+
+
+def _version(header: str | None) -> str:
+    return (header or "").removeprefix("W/").strip('"')
+
+
+def _sent_version(if_match: Annotated[str | None, Header(max_length=80)] = None) -> str:
+    if not if_match:
+        raise AerialDojoError("the If-Match header with the version is missing")
+    return _version(if_match)
+
+
+_Version = Annotated[str, Depends(_sent_version)]
 
 
 class AuthoredRequest(Strict):
@@ -226,28 +235,25 @@ def _add_document(app: FastAPI, session: AnnotationSession) -> None:
         return _with_version(session.document(client))
 
     @app.post("/api/operations")
-    def operate(body: OperationRequest, if_match: _Match = None) -> Response:
-        version = _required(if_match)
+    def operate(body: OperationRequest, version: _Version) -> Response:
         try:
             return _with_version(session.change(version, body.author, body.operation))
         except (StoreError, AnnotationError) as error:
             # A full disk or a half-written file is not the client's fault: it retries.
             return JSONResponse({"error": one_line(str(error))}, status_code=503)
 
-    def saved(change: Any, body: AuthoredRequest, if_match: str | None, *content: bytes) -> Response:
-        return _with_version(session.saved(change(_required(if_match), body.author, *content), body.author))
-
     @app.post("/api/undo")
-    def undo(body: AuthoredRequest, if_match: _Match = None) -> Response:
-        return saved(session.storage.undo, body, if_match)
+    def undo(body: AuthoredRequest, version: _Version) -> Response:
+        return _with_version(session.saved(session.storage.undo(version, body.author), body.author))
 
     @app.post("/api/redo")
-    def redo(body: AuthoredRequest, if_match: _Match = None) -> Response:
-        return saved(session.storage.redo, body, if_match)
+    def redo(body: AuthoredRequest, version: _Version) -> Response:
+        return _with_version(session.saved(session.storage.redo(version, body.author), body.author))
 
     @app.post("/api/import")
-    def import_file(body: ImportRequest, if_match: _Match = None) -> Response:
-        return saved(session.storage.replace, body, if_match, body.text.encode("utf-8", "replace"))
+    def import_file(body: ImportRequest, version: _Version) -> Response:
+        content = body.text.encode("utf-8", "replace")
+        return _with_version(session.saved(session.storage.replace(version, body.author, content), body.author))
 
     @app.post("/api/draft")
     def draft(body: OperationRequest) -> dict[str, Any]:
@@ -328,16 +334,6 @@ def _viewpoint_json(session: AnnotationSession, node: str, row: dict[str, Any], 
 def _near(session: AnnotationSession, place: Any) -> bool:
     low, high = session.scene.bounds
     return bool((place >= low - 5).all() and (place <= high + 5).all())
-
-
-def _version(header: str | None) -> str:
-    return (header or "").removeprefix("W/").strip('"')
-
-
-def _required(header: str | None) -> str:
-    if not header:
-        raise AerialDojoError("the If-Match header with the version is missing")
-    return _version(header)
 
 
 def _with_version(document: dict[str, Any]) -> JSONResponse:

@@ -2,35 +2,54 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
+import json
 import re
+import tempfile
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from aerialdojo_gen.annotations.format import Anchor, Object, format_annotations
+from aerialdojo_gen.annotations.check import SourceCheck
+from aerialdojo_gen.annotations.format import Anchor, Annotations, Object, format_annotations, parse_annotations
 from aerialdojo_gen.annotations.phrases import spoken
+from aerialdojo_gen.annotations.relations import SceneGeometry, nearest_landmark
 from aerialdojo_gen.annotations.vocabulary import Vocabulary
 from aerialdojo_gen.base.config.pipeline import Pipeline
-from aerialdojo_gen.base.errors import AerialDojoError, UsageError
+from aerialdojo_gen.base.errors import AerialDojoError, UsageError, disk_error
 from aerialdojo_gen.base.paper_figures import paper_counts
+from aerialdojo_gen.imports.forms import is_unnamed
 from aerialdojo_gen.pipeline.stage import Job, ProjectPaths
 from aerialdojo_gen.rendering.casters import ray_caster
 from aerialdojo_gen.scenes.build import cut_out
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.model import Scene
-from aerialdojo_gen.scenes.recipe import Cut
-from aerialdojo_gen.studio.annotate import boxes
+from aerialdojo_gen.scenes.recipe import Cut, load_imported
+from aerialdojo_gen.store.atomic import atomic_file
+from aerialdojo_gen.store.staging import scratch_folder
 from aerialdojo_gen.studio.annotate.anchors import AnchorService
-from aerialdojo_gen.studio.annotate.describe import Describer
-from aerialdojo_gen.studio.annotate.document import Add, Change, ConflictError, Operation, apply, edits_of, find
+from aerialdojo_gen.studio.annotate.document import (
+    Add,
+    Change,
+    ConflictError,
+    Operation,
+    apply,
+    describe_entry,
+    edits_of,
+    find,
+)
 from aerialdojo_gen.studio.annotate.storage import Author, History, Record, State, Storage
 from aerialdojo_gen.studio.web.payload import scene_payload
 
 _MAX_CHANGES = 200
+_PATH = re.compile(r"^(landmarks|objects)\[(\d+)\](?:\.(\w+))?")
+_MENTION = re.compile(r"\b(landmarks|objects)\[(\d+)\]")
+_BOX_HEAD = "\n[[imported.cuts]]\n"
 
 
 class AnnotationSession:
@@ -40,10 +59,7 @@ class AnnotationSession:
         self.storage = Storage(roots.annotations, name)
         self.storage.load()
         self._pipeline, self._roots = pipeline, roots
-        catalogue = load_catalogue(roots.scene_assets)
-        self._names = catalogue.names
-        self._catalogue = catalogue
-        self._targets = catalogue.targets
+        self._catalogue = load_catalogue(roots.scene_assets)
         self._counts = paper_counts().get(name) if pipeline.annotate_import.paper_counts else None
         self._lock = threading.RLock()  # the geometry caches results
         self._open_scene()
@@ -65,10 +81,10 @@ class AnnotationSession:
 
     def facts(self) -> dict[str, Any]:
         """Return what does not change: name, bounds and categories with their words."""
-        there = {instance.category for instance in self.scene.instances}
-        words = {category: self._names.get(category, spoken(category)) for category in there}
+        categories = {instance.category for instance in self.scene.instances}
+        words = {category: self._catalogue.names.get(category, spoken(category)) for category in categories}
         if self.scene.imported:
-            words |= {category: self._names[category] for category in self._targets}
+            words |= {category: self._catalogue.names[category] for category in self._catalogue.targets}
         return {
             "scene": self.scene.name,
             "imported": self.scene.imported,
@@ -80,11 +96,9 @@ class AnnotationSession:
             "wanted": self._counts,
         }
 
-    def document(self, client: str = "") -> dict[str, Any]:
+    def document(self, client: str = "", state: State | None = None) -> dict[str, Any]:
         """Return the annotations with positions, faults, and what the tab `client` can undo."""
-        return self._document(self.storage.load(), client)
-
-    def _document(self, state: State, client: str) -> dict[str, Any]:
+        state = state or self.storage.load()
         with self._lock:
             undo, redo = self._history().stacks(client)
             if self._described is None or self._described[0] != state.version:
@@ -120,7 +134,7 @@ class AnnotationSession:
     def saved(self, done: tuple[State, Record | None], author: Author) -> dict[str, Any]:
         """Return the annotations after a change of the storage."""
         state, record = done
-        return self._document(state, author.client) | {"done": record.model_dump(mode="json") if record else None}
+        return self.document(author.client, state) | {"done": record.model_dump(mode="json") if record else None}
 
     def changes_since(self, version: str) -> list[dict[str, Any]]:
         """Return the changes after a version."""
@@ -149,13 +163,13 @@ class AnnotationSession:
 
     def about(self, node: str) -> dict[str, Any]:
         """Return what the mesh says about a node."""
-        instance = self.scene[node]
+        instance, imported = self.scene[node], load_imported(self._recipe)
         return {
             "node": node,
             "category": instance.category,
-            "word": self._names.get(instance.category, spoken(instance.category)),
+            "word": self._catalogue.names.get(instance.category, spoken(instance.category)),
             "attributes": instance.attributes,
-            "boxed": node in boxes.nodes(self._recipe),
+            "boxed": imported is not None and node in {cut.node for cut in imported.cuts},
             "size_m": np.ptp(instance.bounds, axis=0).round(2).tolist(),
             **self._describer.place(node),
             **self._describer.bearing(self.storage.load().annotations, node),
@@ -163,15 +177,19 @@ class AnnotationSession:
 
     def object(self, object_id: int) -> Object:
         """Return an object whose node is in the scene; `UsageError` if there is none."""
-        found = find(self.storage.load().annotations, "objects", object_id)
-        if found is None or not isinstance(found[1], Object) or found[1].node not in self.scene:
+        match = find(self.storage.load().annotations, "objects", object_id)
+        if match is None or not isinstance(match[1], Object) or match[1].node not in self.scene:
             raise UsageError(f"there is no object {object_id} with a node in the scene")
-        return found[1]
+        return match[1]
 
     # Boxes, where an imported mesh has no node for a thing.
 
     def cut(self, low_m: Sequence[float], high_m: Sequence[float], category: str) -> dict[str, Any]:
         """Make a node of what lies in a box (corners in world metres); imported scenes only."""
+        if load_imported(self._recipe) is None:
+            raise AerialDojoError(
+                "this scene is built from a recipe, every thing in it has a node: boxes are not needed"
+            )
         slug = re.sub(r"[^a-z0-9]+", "_", category.lower()).strip("_")[:60]
         if not slug:
             raise AerialDojoError("a category is required")
@@ -180,7 +198,8 @@ class AnnotationSession:
             node = next(n for k in itertools.count() if (n := f"{slug}_{k:03d}") not in self.scene)
             cut = Cut(node=node, category=slug, low_m=tuple(low.tolist()), high_m=tuple(high.tolist()))
             cut_out(self.scene, (cut,))
-            self._rebuild(boxes.with_box(self._recipe, cut))
+            keys = "".join(f"{key} = {json.dumps(value)}\n" for key, value in cut.model_dump(mode="json").items())
+            self._rebuild(self._recipe.read_text(encoding="utf-8") + _BOX_HEAD + keys)
         return self.about(node)
 
     def uncut(self, node: str) -> None:
@@ -189,17 +208,21 @@ class AnnotationSession:
         if node in {e.node for e in annotations.landmarks} | {e.node for e in annotations.objects}:
             raise AerialDojoError(f"{node} is annotated: remove its entry first")
         with self._lock, self.storage.locked():
-            self._rebuild(boxes.without_box(self._recipe, node))
+            head, *boxes = self._recipe.read_text(encoding="utf-8").split(_BOX_HEAD)
+            kept = [box for box in boxes if f"node = {json.dumps(node)}\n" not in box]
+            if len(kept) == len(boxes):
+                raise AerialDojoError(f"{node} was not created by a box")
+            self._rebuild(_BOX_HEAD.join([head, *kept]))
 
     @property
     def _recipe(self) -> Path:
         return self._roots.recipes / f"{self.storage.scene}.toml"
 
     def _rebuild(self, recipe: str) -> None:
-        with boxes.staged(self._roots, self.storage.scene, recipe) as roots:
+        with _staged(self._roots, self.storage.scene, recipe) as roots:
             build(self.storage.scene, self._pipeline, roots)
         before = self.anchors
-        self._open_scene(commit=lambda: boxes.write(self._recipe, recipe))
+        self._open_scene(commit=lambda: _write(self._recipe, recipe))
         before.close()
 
     def _check_anchor(self, object_id: int, anchor: Anchor) -> None:
@@ -236,3 +259,81 @@ def build(scene: str, pipeline: Pipeline, roots: ProjectPaths) -> None:
     from aerialdojo_gen.pipeline.progress import Reporter
 
     runner.run(runner.stages_named(("build-scenes",)), [scene], pipeline, roots, reporter=Reporter(quiet=True))
+
+
+@contextlib.contextmanager
+def _staged(roots: ProjectPaths, scene: str, text: str) -> Iterator[ProjectPaths]:
+    """Lay a changed recipe out for a build, with the scene's own mesh beside it: one that fails replaces none."""
+    with contextlib.ExitStack() as held:
+        try:
+            folder = held.enter_context(scratch_folder())
+            (folder / f"{scene}.toml").write_text(text, encoding="utf-8")
+            (folder / f"{scene}.glb").symlink_to((roots.recipes / f"{scene}.glb").resolve())
+        except OSError as error:
+            raise disk_error(error, Path(tempfile.gettempdir())) from error
+        yield replace(roots, recipes=folder)
+
+
+def _write(recipe: Path, text: str) -> None:
+    with atomic_file(recipe.parent, recipe.name) as path:
+        path.write_text(text, encoding="utf-8")
+
+
+class Describer:
+    """Describes annotations of one scene as JSON; not thread-safe."""
+
+    def __init__(self, vocabulary: Vocabulary, counts: tuple[int, int] | None) -> None:
+        self._scene, self._vocabulary, self._counts = vocabulary.scene, vocabulary, counts
+        self._geometry = SceneGeometry.of(vocabulary.scene)  # caches results
+
+    def describe(self, annotations: Annotations) -> dict[str, Any]:
+        """Describe all entries: ``landmarks``, ``objects`` (each with its ``faults``) and ``faults`` of the file."""
+        source = parse_annotations(format_annotations(annotations))
+        faults: dict[tuple[str, int], list[dict[str, str]]] = {}
+        general = []
+        faulty = SourceCheck(source, self._vocabulary, self._counts).faults
+        for fault in faulty:
+            message = _MENTION.sub(
+                lambda m: describe_entry(m[1], getattr(annotations, m[1])[int(m[2])]), fault.message
+            )
+            at = _PATH.match(fault.path)
+            if at is None:
+                general.append(message)
+            else:
+                faults.setdefault((at[1], int(at[2])), []).append({"field": at[3] or "", "message": message})
+        landmarks = [
+            {**entry.model_dump(), **self.place(entry.node), "faults": faults.get(("landmarks", k), [])}
+            for k, entry in enumerate(annotations.landmarks)
+        ]
+        objects = [
+            self._object(annotations, entry, faults.get(("objects", k), []))
+            for k, entry in enumerate(annotations.objects)
+        ]
+        return {"landmarks": landmarks, "objects": objects, "faults": general}
+
+    def _object(self, annotations: Annotations, entry: Object, faults: list[dict[str, str]]) -> dict[str, Any]:
+        lacks = [key for key in ("name", "category") if not getattr(entry, key).strip()]
+        lacks += ["person"] if is_unnamed(entry.node, entry.category) else []
+        lacks += ["check"] if any(fault["field"] not in lacks for fault in faults) else []
+        return {
+            **entry.model_dump(),
+            "description": entry.description or "",
+            **self.place(entry.node),
+            **self.bearing(annotations, entry.node),
+            "faults": faults,
+            "lacks": lacks,
+        }
+
+    def place(self, node: str) -> dict[str, Any]:
+        """Middle of a node's box, ``position_m``; None where the scene has no such node."""
+        position_m = self._scene[node].centroid.round(3).tolist() if node in self._scene else None
+        return {"position_m": position_m}
+
+    def bearing(self, annotations: Annotations, node: str) -> dict[str, Any]:
+        """Nearest ``landmark`` and ``direction`` of a node, as the task will state them; None where there is none."""
+        marks = [m for m in sorted(annotations.landmarks, key=lambda m: m.id) if m.node in self._scene]
+        places = np.array([self._scene[m.node].centroid for m in marks]).reshape(-1, 3)
+        nearest = nearest_landmark(self._scene[node].centroid, places) if node in self._scene else None
+        if nearest is None:
+            return {"landmark": None, "direction": None}
+        return {"landmark": marks[nearest.landmark].name, "direction": nearest.direction}

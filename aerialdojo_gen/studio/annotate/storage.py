@@ -23,7 +23,7 @@ from aerialdojo_gen.annotations.format import Annotations, Strict, format_annota
 from aerialdojo_gen.base.errors import AnnotationError, brief, disk_error
 from aerialdojo_gen.store.layout import check_scene_name
 from aerialdojo_gen.studio.annotate import document
-from aerialdojo_gen.studio.annotate.document import ConflictError, Edit, Kind, Operation
+from aerialdojo_gen.studio.annotate.document import ConflictError, Edit, Operation
 
 Action = Literal["do", "undo", "redo", "import", "outside"]
 
@@ -91,10 +91,6 @@ class History:
         start = last + 1 if last is not None else first if first is not None else 0
         yield from self.records[start:]
 
-    def highest_id(self, kind: str) -> int:
-        """Return the highest id that a kind of entry ever had; -1 if none."""
-        return max((e.id for record in self.records for e in record.edits if e.kind == kind), default=-1)
-
 
 @dataclass(frozen=True)
 class State:
@@ -115,10 +111,6 @@ class Author:
 
 class StaleError(ConflictError):
     """A change was based on an outdated version of the file."""
-
-    def __init__(self, state: State) -> None:
-        super().__init__("these annotations have been changed by another client")
-        self.state = state
 
 
 class Storage:
@@ -155,7 +147,10 @@ class Storage:
         """Apply an operation and save it."""
 
         def edits(state: State) -> list[Edit]:
-            return document.edits_of(operation, state.annotations, self._next_id(state, operation.kind))
+            # No id is used again, of an entry that is gone either.
+            ids = {entry.id for entry in getattr(state.annotations, operation.kind)}
+            ids |= {e.id for record in self.history.records for e in record.edits if e.kind == operation.kind}
+            return document.edits_of(operation, state.annotations, max(ids, default=-1) + 1)
 
         return self._commit(version, author, "do", edits)
 
@@ -181,10 +176,6 @@ class Storage:
 
         return self._commit(version, author, "redo", edits)
 
-    def _next_id(self, state: State, kind: Kind) -> int:
-        present = max((entry.id for entry in getattr(state.annotations, kind)), default=-1)
-        return max(present, self.history.highest_id(kind)) + 1
-
     def _commit(
         self, version: str, author: Author, action: Action, edits_of_state: Callable[[State], Sequence[Edit]]
     ) -> tuple[State, Record | None]:
@@ -192,7 +183,7 @@ class Storage:
             self._recover()
             state = self._load()
             if state.version != version:
-                raise StaleError(state)
+                raise StaleError("these annotations have been changed by another client")
             edits = tuple(edits_of_state(state))
             after = document.apply(state.annotations, edits)
             if not edits:
@@ -204,16 +195,13 @@ class Storage:
                 time=now, who=author.who, client=author.client, action=action, what=document.describe(edits),
                 before=state.version, after=digest, edits=edits,
             )  # fmt: skip
-            lines = [record]
             last_version = self.history.records[-1].after if self.history.records else state.version
-            if last_version != state.version:
-                outside = Record(
-                    time=now, who="", client="", action="outside", what="changed outside of this tool",
-                    before=last_version, after=state.version, edits=(),
-                )  # fmt: skip
-                lines.insert(0, outside)
+            outside = Record(
+                time=now, who="", client="", action="outside", what="changed outside of this tool",
+                before=last_version, after=state.version, edits=(),
+            )  # fmt: skip
             try:
-                self._write(raw, lines)
+                self._write(raw, [record] if last_version == state.version else [outside, record])
             except OSError as error:
                 raise disk_error(error, self.path) from error
             self.history.refresh()

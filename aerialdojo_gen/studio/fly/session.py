@@ -59,7 +59,7 @@ class Session(AgentBase):
         self._next_scene = ""
         self.error: Exception | None = None
         self._changed = threading.Condition()
-        self._given: str | int | None = None
+        self._choice: str | int | None = None
         self._closing = False
         self._state: dict[str, Any] = {
             "version": 0, "phase": "busy", "agent": evaluation.agent, "run": evaluation.run, "log": str(log),
@@ -70,14 +70,14 @@ class Session(AgentBase):
         with self._changed:
             return dict(self._state)
 
-    def submit(self, version: int, given: str | int) -> dict[str, Any]:
+    def submit(self, version: int, choice: str | int) -> dict[str, Any]:
         """Hand the loop the person's choice, and return the state after it; StaleError if that is not asked for."""
         with self._changed:
             phase = self._state["phase"]
-            fits = phase == "flying" if isinstance(given, int) else (phase, given) in _BUTTONS
+            fits = phase == "flying" if isinstance(choice, int) else (phase, choice) in _BUTTONS
             if version != self._state["version"] or not fits:
                 raise StaleError("the page was behind: nothing was done")
-            self._given = given
+            self._choice = choice
             self._set(version=version + 1, phase="busy")
             self._changed.notify_all()
             self._changed.wait_for(lambda: self._state["phase"] != "busy" or self._closing, _PATIENCE_S)
@@ -85,20 +85,17 @@ class Session(AgentBase):
 
     def picture(self, view: str) -> NDArray[np.uint8]:
         """Return what a camera shows, (H, W, 3) uint8, or the goal's picture; UsageError if there is none."""
-        if view == "goal":
-            image = None if self._goal is None else self._goal.image
-        else:
-            image = None if self._observation is None else self._observation.rgb.get(view)
+        shown = {} if self._observation is None else self._observation.rgb
+        image = self._goal.image if self._goal is not None and view == "goal" else shown.get(view)
         if image is None:
             raise UsageError(f"there is no picture {view[:20]!r}")
         return image
 
     def depth_m(self, view: str) -> NDArray[np.float32]:
         """Return a camera's depth, (H, W) float32 metres, 0 where nothing is in range; UsageError without one."""
-        depth = None if self._observation is None else self._observation.depth_m.get(view)
-        if depth is None:
+        if self._observation is None or view not in self._observation.depth_m:
             raise UsageError(f"there is no depth of {view[:20]!r}")
-        return depth
+        return self._observation.depth_m[view]
 
     def counts(self) -> tuple[int, int]:
         """Return the numbers of tasks flown and of successes, in the tables."""
@@ -146,11 +143,8 @@ class Session(AgentBase):
             pass
         except Exception as error:
             self.error = error
-            known = isinstance(error, AerialDojoError)
-            self._show(
-                "failed",
-                error=str(error) if known else "an unexpected error: end the command, and the terminal shows it",
-            )
+            defect = "an unexpected error: end the command, and the terminal shows it"
+            self._show("failed", error=str(error) if isinstance(error, AerialDojoError) else defect)
         finally:
             self._flight.close()
             release_context()
@@ -158,9 +152,7 @@ class Session(AgentBase):
     def _fly_all(self) -> None:
         # A task that the renderer failed at is offered again, unlike one that was flown.
         left = pa.concat_tables([self._run.todo(False), self._run.todo(True)])
-        left = left.take(
-            _spread(left["scene"].to_pylist(), left["task_id"].to_pylist(), self._evaluation.selection.seed)
-        )
+        left = left.take(_spread(left, self._evaluation.selection.seed))
         # One attempt: a second one would begin in the middle of the person's flight.
         worker = Worker(self, self._flight, self._data, self._evaluation.identity(), RetryPolicy(1), Secrets())
         scenes = [*left["scene"].to_pylist(), ""]
@@ -188,31 +180,32 @@ class Session(AgentBase):
         finished, successes = self.counts()
         self._set(selected=self._run.rows.num_rows, flown=finished, successes=successes)
 
-    def _set(self, **shown: Any) -> None:
+    def _set(self, **fields: Any) -> None:
         with self._changed:
-            self._state |= shown
+            self._state |= fields
 
-    def _show(self, phase: str, **shown: Any) -> None:
+    def _show(self, phase: str, **fields: Any) -> None:
         with self._changed:
-            self._set(version=self._state["version"] + 1, phase=phase, **shown)
+            self._set(version=self._state["version"] + 1, phase=phase, **fields)
             self._changed.notify_all()
 
-    def _wait(self, phase: str, **shown: Any) -> str | int:
+    def _wait(self, phase: str, **fields: Any) -> str | int:
         with self._changed:
-            self._given = None
-            self._show(phase, **shown)
-            self._changed.wait_for(lambda: self._given is not None or self._closing)
-            if self._given is None:
+            self._choice = None
+            self._show(phase, **fields)
+            self._changed.wait_for(lambda: self._choice is not None or self._closing)
+            if self._choice is None:
                 raise _ClosingError("the command has ended")
-            return self._given
+            return self._choice
 
 
 # What may be chosen where, beside the actions of a flight.
 _BUTTONS = {("consent", "agree"), ("ended", "next")}
 
 
-def _spread(scenes: list[str], task_ids: list[str], seed: int) -> pa.Array:
+def _spread(tasks: pa.Table, seed: int) -> pa.Array:
     """Order tasks so that whenever the person ends, all scenes have as many flights: one of each, then a second."""
+    scenes, task_ids = tasks["scene"].to_pylist(), tasks["task_id"].to_pylist()
     turns, keys = Counter[str](), []
     for i in sorted(range(len(task_ids)), key=lambda i: rng.rank(seed, "fly", task_ids[i])):
         keys.append((turns[scenes[i]], rng.rank(seed, "fly", scenes[i]), i))

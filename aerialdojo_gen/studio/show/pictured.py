@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import groupby
-from pathlib import Path
 from typing import Any
 
 import cv2
@@ -23,7 +22,7 @@ from aerialdojo_gen.geometry.motion import sampled
 from aerialdojo_gen.rendering.orthographic import OrthographicPictures, orthographic_pictures
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
-from aerialdojo_gen.store.root import DataRoot, is_outside
+from aerialdojo_gen.store.root import is_outside
 
 SIZE_PX = 320
 
@@ -38,19 +37,17 @@ class Frame:
     recorded: bool  # Whether it comes from a recording
 
 
-def frames_along(task: TaskRecord, count: int) -> list[Frame]:
-    """Return front views at evenly spaced poses of a route, including start and goal."""
+def frames_along(task: TaskRecord, poses: NDArray[np.float64], count: int) -> list[Frame]:
+    """Return front views at evenly spaced poses (K + 1, 4) of a route, including start and goal."""
     if count == 0:
         return []
-    route = task.route
-    poses = np.column_stack([route["x_m"], route["y_m"], route["z_m"], route["yaw_rad"]])
     steps = sorted({round(k) for k in np.linspace(0, len(poses) - 1, count)})
     pictures = _recorded(task, steps)
     recorded = pictures is not None
     if pictures is None:
         pictures = _rendered(task, poses[steps])
     return [
-        Frame(step, schemas.ACTION_NAMES[route["action"][step]], picture, recorded)
+        Frame(step, schemas.ACTION_NAMES[task.route["action"][step]], picture, recorded)
         for step, picture in zip(steps, pictures, strict=True)
     ]
 
@@ -76,26 +73,20 @@ def _recorded(task: TaskRecord, steps: list[int]) -> list[NDArray[np.uint8]] | N
     from aerialdojo_gen.rendering.reader import open_view
 
     frames = store.read_scene(root, "frames", scene, ["nav_id", "frame", "step"])
-    frames = frames.filter(pc.equal(frames["nav_id"], task.nav_id))
-    first: dict[int, int] = {}
-    for frame, step in zip(frames["frame"].to_pylist(), frames["step"].to_pylist(), strict=True):
-        first[step] = min(frame, first.get(step, frame))
+    frames = frames.filter(pc.equal(frames["nav_id"], task.nav_id)).sort_by([("frame", "descending")])
+    first = dict(zip(frames["step"].to_pylist(), frames["frame"].to_pylist(), strict=True))
     if any(step not in first for step in steps):
         return None
-    video = open_view(_local_video(root, path), "front", "rgb")
+    if is_outside(root, path):
+        raise StoreError(f"recordings: path {path!r} points outside {root}")
+    try:
+        video = open_view(root.local_copy(path), "front", "rgb")
+    except FileNotFoundError:
+        raise StoreError(f"the recording {root.at(path)} is missing: run {command('render')}") from None
     return [
         np.asarray(cv2.resize(video[first[step]], (SIZE_PX, SIZE_PX), interpolation=cv2.INTER_AREA), dtype=np.uint8)
         for step in steps
     ]
-
-
-def _local_video(root: DataRoot, path: str) -> Path:
-    if is_outside(root, path):
-        raise StoreError(f"recordings: path {path!r} points outside {root}")
-    try:
-        return root.local_copy(path)
-    except FileNotFoundError:
-        raise StoreError(f"the recording {root.at(path)} is missing: run {command('render')}") from None
 
 
 Floats = NDArray[np.float64]
@@ -199,6 +190,6 @@ def picture_task(task: TaskRecord, modality: str = "semantic", frames: int = 5) 
         clearance_m=scene.clearance(way),
         below_m=pictures.surface_below(way),
         reference=decode_rgb(target["reference_image"]),
-        frames=frames_along(task, frames),
+        frames=frames_along(task, poses, frames),
         pictures=pictures,
     )

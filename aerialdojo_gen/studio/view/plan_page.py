@@ -30,14 +30,14 @@ class WatchedPlan:
     def current(self) -> tuple[bytes, dict[str, Any]]:
         """Build if a file changed since the last call; return the scene and what the page says of it."""
         with self._lock:
-            seen = []
+            stamps = []
             for file in (self.path, *sorted(self._assets.rglob("*.toml"))):
                 # An editor that saves replaces the file.
                 with contextlib.suppress(OSError):
                     stat = file.stat()
-                    seen.append((file, stat.st_mtime_ns, stat.st_size))
-            if seen != self._last_version:
-                self._last_version = seen
+                    stamps.append((file, stat.st_mtime_ns, stat.st_size))
+            if stamps != self._last_version:
+                self._last_version = stamps
                 self._version += 1
                 self._build()
             return self._payload, self._state
@@ -60,16 +60,16 @@ class WatchedPlan:
 
 def _entry_lines(text: str) -> dict[str, int]:
     """Number the lines where entries begin, by their names."""
-    found: dict[str, int] = {}
+    lines: dict[str, int] = {}
     table = inner = -1
     for number, line in enumerate(text.splitlines(), 1):
         if line.strip() == "[[site]]":
             table, inner = table + 1, -1
-            found[f"site[{table}]"] = number
+            lines[f"site[{table}]"] = number
         elif table >= 0 and line.startswith("  {"):
             inner += 1
-            found[f"site[{table}].entries[{inner}]"] = number
-    return found
+            lines[f"site[{table}].entries[{inner}]"] = number
+    return lines
 
 
 def plan_app(path: Path, assets: Path) -> FastAPI:

@@ -17,7 +17,6 @@ from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.base.names import unknown
 from aerialdojo_gen.base.pictures import GALLERY_JPEG, decode_rgb, encode_jpeg
 from aerialdojo_gen.dataset.lookup import ReleasedScene
-from aerialdojo_gen.geometry.cameras import Camera, look_at_pose
 from aerialdojo_gen.geometry.motion import sampled
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.store import schemas
@@ -133,7 +132,6 @@ def route_detail(scene: ReleasedScene, nav_id: str) -> dict[str, Any]:
 _T = TypeVar("_T")
 # A payload takes some 20 MB, the objects with their images as much.
 _MAX_OPEN = 4
-_WIDTH_PX, _HEIGHT_PX, _FOV_DEG = 480, 300, 60.0
 THUMB_PX = 224
 
 
@@ -202,11 +200,10 @@ class SceneCache:
 
 
 def _picture(scene: Scene) -> bytes:
-    from aerialdojo_gen.rendering.backend import choose_renderer, scene_renderer
+    from aerialdojo_gen.rendering.gallery import look_at
 
     low, high = scene.bounds
     centre, size = (low + high) / 2, float(np.hypot(*(high - low)[:2]))
     eye = np.array([centre[0] - 0.2 * size, centre[1] - 0.3 * size, low[2] + 0.4 * size])
-    camera = Camera(_WIDTH_PX, _HEIGHT_PX, _FOV_DEG)
-    pose = look_at_pose(eye, np.array([centre[0], centre[1], low[2] + 2.0]))
-    return encode_jpeg(scene_renderer(scene, choose_renderer().name).render(camera, pose).rgb, GALLERY_JPEG)
+    target = np.array([centre[0], centre[1], low[2] + 2.0])
+    return encode_jpeg(look_at(scene, eye, target, 480, 300), GALLERY_JPEG)

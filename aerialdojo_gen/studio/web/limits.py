@@ -45,8 +45,12 @@ class LimitedProtocol(H11Protocol):
         mine = [c for c in others if c.host == self.host]
         if len(mine) > MAX_PER_CLIENT:
             self._make_room(mine)
-        elif len(others) > most_connections():
-            self._make_room(others)
+        else:
+            # At most half the process's file limit.
+            files = resource.getrlimit(resource.RLIMIT_NOFILE)[0]
+            half = MAX_CONNECTIONS if files == resource.RLIM_INFINITY else max(8, files // 2)
+            if len(others) > min(MAX_CONNECTIONS, half):
+                self._make_room(others)
 
     def _make_room(self, others: list[LimitedProtocol]) -> None:
         waiting = [c for c in others if c._phase and c is not self]
@@ -120,12 +124,6 @@ class LimitedProtocol(H11Protocol):
             self.transport.abort()
 
 
-def most_connections() -> int:
-    """Maximum open connections: at most half the process's file limit."""
-    files = resource.getrlimit(resource.RLIMIT_NOFILE)[0]
-    return MAX_CONNECTIONS if files == resource.RLIM_INFINITY else max(8, min(MAX_CONNECTIONS, files // 2))
-
-
 class BoundedLog(logging.Filter):
     """Limits log lines per minute, and reports how many were dropped."""
 
@@ -146,9 +144,3 @@ class BoundedLog(logging.Filter):
             return False
         self._passed += 1
         return True
-
-
-def bound_log() -> None:
-    """Limit the log of the server and the event loop."""
-    for name in ("uvicorn.error", "asyncio"):
-        logging.getLogger(name).addFilter(BoundedLog())

@@ -9,6 +9,7 @@ from __future__ import annotations
 import base64
 import contextlib
 import hashlib
+import logging
 import re
 import signal
 import socket
@@ -21,73 +22,39 @@ from typing import TYPE_CHECKING
 from aerialdojo_gen.base.errors import AerialDojoError, MissingPackage, UsageError, no_package
 
 if TYPE_CHECKING:
-    from fastapi import FastAPI
-    from starlette.types import ASGIApp, Message, Receive, Scope, Send
+    from fastapi import FastAPI, Request
+    from starlette.middleware.base import RequestResponseEndpoint
 
 STATIC = Path(__file__).resolve().parent / "static"
 _LOCAL = ("127.0.0.1", "localhost")
 _IMPORT_MAP = re.compile(rb'<script type="importmap">(.*?)</script>', re.DOTALL)
 
 
-class _LocalOnly:
-    """ASGI middleware: rejects foreign hosts, origins and large bodies, and sets security headers."""
+# What every answer says; the policy is the page's.
+_HEADERS = {
+    "x-content-type-options": "nosniff", "referrer-policy": "no-referrer", "cache-control": "no-cache",
+    "cross-origin-resource-policy": "same-origin", "cross-origin-opener-policy": "same-origin",
+}  # fmt: skip
 
-    def __init__(self, app: ASGIApp, policy: str, max_body_bytes: int, any_host: bool = False) -> None:
-        self._app, self._max_body_bytes, self._any_host = app, max_body_bytes, any_host
-        self._headers = [
-            (b"content-security-policy", policy.encode()),
-            (b"x-content-type-options", b"nosniff"),
-            (b"referrer-policy", b"no-referrer"),
-            (b"cross-origin-resource-policy", b"same-origin"),
-            (b"cross-origin-opener-policy", b"same-origin"),
-            (b"cache-control", b"no-cache"),
-        ]
 
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        if scope["type"] == "lifespan":
-            await self._app(scope, receive, send)
-            return
-        refusal = self._refusal(scope)
-
-        async def send_with_headers(message: Message) -> None:
-            if message["type"] == "http.response.start":
-                message["headers"] = [*message.get("headers", []), *self._headers]
-            await send(message)
-
-        if refusal is None:
-            await self._app(scope, receive, send_with_headers)
-            return
-        status, why = refusal
-        await send_with_headers(
-            {"type": "http.response.start", "status": status, "headers": [(b"content-type", b"text/plain")]}
-        )
-        await send({"type": "http.response.body", "body": why.encode()})
-
-    def _refusal(self, scope: Scope) -> tuple[int, str] | None:
-        if scope["type"] != "http":
-            return 400, "plain HTTP only"
-        headers: dict[bytes, list[bytes]] = {}
-        for name, value in scope["headers"]:
-            headers.setdefault(name.lower(), []).append(value)
-        port = scope["server"][1]
-        hosts = {f"{name}:{port}".encode() for name in _LOCAL}
-        if port == 80:
-            hosts |= {name.encode() for name in _LOCAL}
-        found = headers.get(b"host", [])
-        if self._any_host:
-            hosts |= {host.lower() for host in found}
-        if len(found) != 1 or found[0].lower() not in hosts:
-            return 403, "only 127.0.0.1 and localhost are allowed"
-        if any(origin.lower() not in {b"http://" + host for host in hosts} for origin in headers.get(b"origin", [])):
-            return 403, "requests from other sites are not allowed"
-        if headers.get(b"sec-fetch-site", [b"none"])[0] in (b"cross-site", b"same-site"):
-            return 403, "requests from other sites are not allowed"
-        if b"transfer-encoding" in headers:
-            return 411, "send a Content-Length"
-        length = headers.get(b"content-length", [b"0"])[0]
-        if not length.isdigit() or len(length) > 18 or int(length) > self._max_body_bytes:
-            return 413, f"at most {self._max_body_bytes} bytes"
-        return None
+def _refusal(request: Request, max_body_bytes: int, any_host: bool) -> tuple[str, int] | None:
+    """Say why a request of a foreign host or origin, or with a large body, is refused, and by which status."""
+    headers, port = request.headers, request.scope["server"][1]
+    hosts = {f"{name}:{port}" for name in _LOCAL} | (set(_LOCAL) if port == 80 else set())
+    asked_for = [host.lower() for host in headers.getlist("host")]
+    if any_host:
+        hosts |= set(asked_for)
+    if len(asked_for) != 1 or asked_for[0] not in hosts:
+        return "only 127.0.0.1 and localhost are allowed", 403
+    foreign = any(origin.lower() not in {f"http://{host}" for host in hosts} for origin in headers.getlist("origin"))
+    if foreign or headers.get("sec-fetch-site", "none") in ("cross-site", "same-site"):
+        return "requests from other sites are not allowed", 403
+    if "transfer-encoding" in headers:
+        return "send a Content-Length", 411
+    length = headers.get("content-length", "0")
+    if not (length.isascii() and length.isdigit()) or len(length) > 18 or int(length) > max_body_bytes:
+        return f"at most {max_body_bytes} bytes", 413
+    return None
 
 
 def require_web() -> None:
@@ -110,9 +77,9 @@ def local_app(
 ) -> FastAPI:
     """Make an app that serves a page of ``static/`` at ``/``, and that folder under ``/static/``."""
     require_web()
-    from fastapi import FastAPI, Request
+    from fastapi import FastAPI
     from fastapi.exceptions import RequestValidationError
-    from fastapi.responses import JSONResponse, Response
+    from fastapi.responses import JSONResponse, PlainTextResponse, Response
     from fastapi.staticfiles import StaticFiles
     from starlette.exceptions import HTTPException
 
@@ -125,7 +92,13 @@ def local_app(
         "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
     )
     app = FastAPI(title=title, docs_url=None, redoc_url=None, openapi_url=None)
-    app.add_middleware(_LocalOnly, policy=policy, max_body_bytes=max_body_bytes, any_host=any_host)
+
+    @app.middleware("http")
+    async def local_only(request: Request, call_next: RequestResponseEndpoint) -> Response:
+        refusal = _refusal(request, max_body_bytes, any_host)
+        answer = await call_next(request) if refusal is None else PlainTextResponse(*refusal)
+        answer.headers.update(_HEADERS | {"content-security-policy": policy})
+        return answer
 
     @app.get("/", include_in_schema=False, response_model=None)
     def index() -> Response:
@@ -136,23 +109,16 @@ def local_app(
         return Response(status_code=204)
 
     @app.exception_handler(AerialDojoError)
-    def expected(_: Request, error: Exception) -> JSONResponse:
-        return error_response(error, 404 if isinstance(error, UsageError) else 400)
-
     @app.exception_handler(RequestValidationError)
-    def malformed(_: Request, error: Exception) -> JSONResponse:
-        assert isinstance(error, RequestValidationError)
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"])
-        return error_response(f"malformed request: {where}: {first['msg']}", 422)
-
     @app.exception_handler(HTTPException)
     def refused(_: Request, error: Exception) -> JSONResponse:
-        assert isinstance(error, HTTPException)
-        return error_response(error.detail, error.status_code)
-
-    def error_response(what: object, status: int) -> JSONResponse:
-        return JSONResponse({"error": one_line(str(what))}, status_code=status)
+        message, status = str(error), 404 if isinstance(error, UsageError) else 400
+        if isinstance(error, RequestValidationError):
+            first = error.errors()[0]
+            message, status = f"malformed request: {'.'.join(map(str, first['loc']))}: {first['msg']}", 422
+        elif isinstance(error, HTTPException):
+            message, status = error.detail, error.status_code
+        return JSONResponse({"error": one_line(message)}, status)
 
     app.mount("/static", StaticFiles(directory=STATIC, follow_symlink=False), name="static")
     return app
@@ -177,7 +143,7 @@ def serve(app: FastAPI, listener: socket.socket, browser: bool = False, path: st
     """Serve until Ctrl-C."""
     import uvicorn
 
-    from aerialdojo_gen.studio.web.limits import LimitedProtocol, bound_log
+    from aerialdojo_gen.studio.web.limits import BoundedLog, LimitedProtocol
 
     class Server(uvicorn.Server):
         @contextlib.contextmanager
@@ -196,7 +162,8 @@ def serve(app: FastAPI, listener: socket.socket, browser: bool = False, path: st
     )  # fmt: skip
     # uvicorn's limit_concurrency is not set: it counts all connections, and half requests would lock out all others.
     server = Server(config)
-    bound_log()
+    for name in ("uvicorn.error", "asyncio"):
+        logging.getLogger(name).addFilter(BoundedLog())
     if browser:
         threading.Thread(target=webbrowser.open, args=(url,), daemon=True).start()
     try:

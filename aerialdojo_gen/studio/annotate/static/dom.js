@@ -1,18 +1,8 @@
 // Small helpers to build pages. Text goes in as text, never as HTML: what people type cannot become markup.
 
-/** Make an element: h("button", {class: "main", onclick}, "text", child, ...). */
-export function h(tag, attributes = {}, ...children) {
-  const element = document.createElement(tag);
-  for (const [key, value] of Object.entries(attributes)) {
-    if (key.startsWith("on")) element.addEventListener(key.slice(2), value);
-    else if (value === true) element.setAttribute(key, "");
-    else if (value !== false && value != null) element.setAttribute(key, value);
-  }
-  element.append(...children.filter((child) => child != null && child !== false));
-  return element;
-}
+import { make as h } from "/static/dom.js";
 
-const SVG = "http://www.w3.org/2000/svg";
+export { h };
 
 /** A picture from a viewpoint with the object's box drawn over it. */
 export function picture(viewpoint, [width, height], alt) {
@@ -20,13 +10,9 @@ export function picture(viewpoint, [width, height], alt) {
   const query = new URLSearchParams({ x, y, z, yaw_deg: viewpoint.yaw_deg });
   const frame = h("span", { class: "picture" }, h("img", { src: `/api/picture?${query}`, alt, width, height }));
   if (viewpoint.box_px) {
-    const svg = document.createElementNS(SVG, "svg");
-    svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
     const [u0, v0, u1, v1] = viewpoint.box_px;
-    const rect = document.createElementNS(SVG, "rect");
-    for (const [key, value] of Object.entries({ x: u0, y: v0, width: u1 - u0, height: v1 - v0 })) rect.setAttribute(key, value);
-    svg.append(rect);
-    frame.append(svg);
+    const box = h("rect", { x: u0, y: v0, width: u1 - u0, height: v1 - v0 });
+    frame.append(h("svg", { viewBox: `0 0 ${width} ${height}` }, box));
   }
   return frame;
 }

@@ -1,5 +1,6 @@
 // Elements from data. Text is only ever set as text: names come from files.
 
+/** Make an element: make("button", { class: "main", onclick }, "text", child, ...). */
 export function make(tag, attributes = {}, ...children) {
   const svg = ["svg", "path", "rect", "circle", "line", "text", "title"].includes(tag);
   const element = svg ? document.createElementNS("http://www.w3.org/2000/svg", tag) : document.createElement(tag);
@@ -7,7 +8,7 @@ export function make(tag, attributes = {}, ...children) {
     if (key.startsWith("on")) element.addEventListener(key.slice(2), value);
     else if (value !== false && value != null) element.setAttribute(key, value === true ? "" : value);
   }
-  element.append(...children.filter((child) => child != null));
+  element.append(...children.filter((child) => child != null && child !== false));
   return element;
 }
 
@@ -22,4 +23,16 @@ export const words = (text) => text.replaceAll("_", " ");
 export function hasWords(text, wish) {
   const spaced = ` ${text.toLowerCase().replace(/[^\p{L}\p{N}]+/gu, " ")}`;
   return wish.every((word) => spaced.includes(` ${word}`));
+}
+
+/** The sign over the scene that says what is waited for. */
+export class Busy {
+  constructor(element) { this.element = element; }
+
+  show(text) {
+    this.element.querySelector(".busy-text").textContent = text;
+    this.element.hidden = false;
+  }
+
+  hide() { this.element.hidden = true; }
 }

@@ -1,6 +1,5 @@
 // The page of `aerialdojo-gen fly`: what an agent sees, and its sixteen actions as keys and buttons.
-import { Busy } from "./busy.js";
-import { make, number } from "./dom.js";
+import { Busy, make, number } from "./dom.js";
 
 const POLL_MS = 500;
 const $ = (id) => document.getElementById(id);

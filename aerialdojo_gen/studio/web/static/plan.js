@@ -1,7 +1,6 @@
 // The page of `aerialdojo-gen build-scenes --watch`: a plan's scene, again whenever the file is saved.
-import { Busy } from "./busy.js";
 import { addCompass } from "./compass.js";
-import { facts, make, number, words } from "./dom.js";
+import { Busy, facts, make, number, words } from "./dom.js";
 import { frameNode } from "./frame.js";
 import { SceneView } from "./scene.js";
 

@@ -1,6 +1,5 @@
 // The start page of `aerialdojo-gen view`: scenes with their pictures, tasks with their goals.
-import { Busy } from "./busy.js";
-import { make, number, words } from "./dom.js";
+import { Busy, make, number, words } from "./dom.js";
 import { LazyPictures } from "./lazy.js";
 
 const PAGE = 48, TYPING_MS = 250;

@@ -1,8 +1,7 @@
 // The page of a scene of `aerialdojo-gen view`: its landmarks, objects, anchors and routes.
-import { Busy } from "./busy.js";
 import { ANCHOR, clearanceColour, GOAL, LANDMARK, OBJECT, START } from "./colours.js";
 import { addCompass } from "./compass.js";
-import { make, number, words } from "./dom.js";
+import { Busy, make, number, words } from "./dom.js";
 import { Flight } from "./flight.js";
 import { frameNode } from "./frame.js";
 import { failure, showLandmark, showNode, showObject, showRoute, welcome } from "./panel.js";
