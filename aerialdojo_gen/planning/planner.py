@@ -158,17 +158,15 @@ class Planner:
             return self.plan_target(goal_pose, start_pose)[0]
         c, min_reach_m = self.config, 0.0
         for _ in range(_TRIES):
-            with self._near_field.between(goal_pose, start_pose, min_reach_m) as found:
-                if found.cost is None:
-                    return Route("NO_PATH") if found.unreachable else self.plan_target(goal_pose, start_pose)[0]
-                cells, moves = self.grid.arrays, self.grid.moves
-                length = lengths_at(
-                    start_pose[None, :3], goal_pose[:3], cells, moves, found.cost, self._clearance_cost
-                )
-                route = self._estimate(start_pose, goal_pose, float(length[0]))
-                if route.outcome != "NOT_NEEDED":
-                    return route
-                route = self._search(start_pose, goal_pose, route.cost_to_go_m, found.cost, c.ladder[:1])
+            found = self._near_field.between(goal_pose, start_pose, min_reach_m)
+            if found.cost is None:
+                return Route("NO_PATH") if found.unreachable else self.plan_target(goal_pose, start_pose)[0]
+            cells, moves = self.grid.arrays, self.grid.moves
+            length = lengths_at(start_pose[None, :3], goal_pose[:3], cells, moves, found.cost, self._clearance_cost)
+            route = self._estimate(start_pose, goal_pose, float(length[0]))
+            if route.outcome != "NOT_NEEDED":
+                return route
+            route = self._search(start_pose, goal_pose, route.cost_to_go_m, found.cost, c.ladder[:1])
             min_reach_m = float(self._memory[c.ladder[0].budget].highest[0])
             if route.outcome != "SOLVED":
                 break
