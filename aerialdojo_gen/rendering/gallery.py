@@ -205,11 +205,11 @@ def reference_sheets(rows: Sequence[Mapping[str, Any]]) -> Iterator[Image]:
         sheet = np.full((-(-len(page) // _COLUMNS) * height, _COLUMNS * width, 3), 255, np.uint8)
         for k, row in enumerate(page):
             top, left = k // _COLUMNS * height, k % _COLUMNS * width
-            _put(sheet[top : top + height, left : left + width], row)
+            _write_cell(sheet[top : top + height, left : left + width], row)
         yield sheet
 
 
-def _put(cell: Image, row: Mapping[str, Any]) -> None:
+def _write_cell(cell: Image, row: Mapping[str, Any]) -> None:
     picture = decode_rgb(row["reference_image"]) if row["reference_image"] else None
     if picture is not None:
         cell[:_SIZE_PX, :_SIZE_PX] = cv2.resize(picture, (_SIZE_PX, _SIZE_PX), interpolation=cv2.INTER_AREA)
