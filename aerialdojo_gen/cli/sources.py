@@ -228,7 +228,7 @@ def gallery(
         print(write_picture(designs_sheet(catalogue, designs, 140), out, f"designs.{suffix}", width))
         return
     if kit:
-        from aerialdojo_gen.rendering.kit_gallery import kit_sheets
+        from aerialdojo_gen.rendering.gallery import kit_sheets
 
         for name, sheet in kit_sheets(catalogue, [roots.recipes / f"{name}.toml" for name in chosen]):
             print(write_picture(sheet, out, f"{name}.{suffix}", width))

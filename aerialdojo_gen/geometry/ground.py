@@ -2,7 +2,7 @@
 
 Imported terrain (a survey's heightfield, a photogrammetric model) is mostly a sheet without an underside: surfaces
 alone do not keep a body out of the earth, for it can go round the rim, or through a hole, and be below it without a
-touch. What lies below a sheet cannot be told from its winding either, which imports often have wrong. It is told
+touch. What lies below a sheet cannot be read from its winding either, which imports often have wrong. It is decided
 here, once for all who ask: a point is below ground where a plumb line meets ground above it and none below it.
 """
 
@@ -34,7 +34,7 @@ _WELD_M = 1e-3
 # What ends this far below the flight volume is not in it: the level ground that add-scene lays under everything.
 _BELOW_M = 1e-3
 _PIECE_M = 0.5
-_BESIDE_M = 0.02
+_OUTSIDE_M = 0.02
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +78,8 @@ class Ground:
         faces, body, owner = faces[order], body[order], owner[order]
         triangles = corners[faces].reshape(-1, 9)
         n = int(body[-1]) + 1 if len(body) else 0
-        is_ground = _has_rim(faces, body, n)
+        # What has a rim is open.
+        is_ground = np.bincount(np.tile(body, 3), _edges(faces)[1], n) > 0
         if not labelled:
             covered, single, bottom = shares_of(triangles, body, n, lowest, plan)
             up, area = _areas(triangles)
@@ -124,7 +125,7 @@ class Ground:
         # The floor of the flight volume is gone through, so that no edge of the curtain lies in it.
         floor = np.where(below > 0, floor, low[2] - radius_m)
         outside = middle.copy()
-        outside[:, :2] -= _BESIDE_M * inwards
+        outside[:, :2] -= _OUTSIDE_M * inwards
         _, _, away = self._columns.layers(outside)
         lowest = self.lowest_m(outside[:, :2])
         # What lies higher beyond the rim has a rim of its own.
@@ -190,11 +191,6 @@ def _edges(faces: Ints) -> tuple[Ints, Flags]:
         edges[:, 0] * (int(faces.max(initial=0)) + 1) + edges[:, 1], return_inverse=True, return_counts=True
     )
     return edges, count[same.reshape(-1)] == 1
-
-
-def _has_rim(faces: Ints, body: Ints, n: int) -> Flags:
-    _, single = _edges(faces)
-    return np.bincount(np.tile(body, 3), single, n) > 0
 
 
 def _rim(faces: Ints, corners: Floats) -> Floats:

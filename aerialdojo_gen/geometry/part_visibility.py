@@ -17,7 +17,7 @@ from aerialdojo_gen.geometry.surface import Surface
 
 # Within it an object counts as seen from its front: a step in the marks, which a little more light must not outweigh.
 FRONT_RAD = math.radians(60.0)
-# What the sun does not reach is seen by the light of the sky, and told less easily.
+# What the sun does not reach is seen by the light of the sky, and recognised less easily.
 _SHADE = 0.8
 _OFF_SURFACE_M = 2e-3
 

@@ -49,8 +49,16 @@ class _Shapes(threading.local):
     """Query shapes, one set per thread: two threads may query one world."""
 
     def __init__(self) -> None:
-        self.spheres: dict[float, fcl.CollisionObject] = {}
-        self.capsules: dict[tuple[float, float], fcl.CollisionObject] = {}
+        self._made: dict[tuple[float, float], fcl.CollisionObject] = {}
+
+    def of(self, radius_m: float, length_m: float = 0.0) -> fcl.CollisionObject:
+        """Return a capsule of that length between the middles of its ends; a ball for none."""
+        key = (radius_m, length_m)
+        if key not in self._made:
+            if len(self._made) > 256:
+                self._made.clear()
+            self._made[key] = fcl.CollisionObject(fcl.Capsule(*key) if length_m else fcl.Sphere(radius_m))
+        return self._made[key]
 
 
 @njit(cache=True)
@@ -126,13 +134,7 @@ class CollisionWorld:
         length = math.sqrt(dx * dx + dy * dy + dz * dz)
         if length < 1e-9:
             return self.sphere_in_collision(p, radius_m)
-        key = (radius_m, round(length, 9))
-        capsules = self._shapes.capsules
-        capsule = capsules.get(key)
-        if capsule is None:
-            if len(capsules) > 256:
-                capsules.clear()
-            capsule = capsules[key] = fcl.CollisionObject(fcl.Capsule(radius_m, key[1]))
+        capsule = self._shapes.of(radius_m, round(length, 9))
         capsule.setRotation(_along_z(dx / length, dy / length, dz / length))
         capsule.setTranslation(np.array([(ax + bx) / 2, (ay + by) / 2, (az + bz) / 2]))
         return self._collides(capsule, ax, ay, az, bx, by, bz, radius_m)
@@ -153,10 +155,7 @@ class CollisionWorld:
         return any(self.segment_in_collision(a, b, radius_m) for a, b in itertools.pairwise(p))
 
     def _sphere(self, p: ArrayLike, radius_m: float) -> fcl.CollisionObject:
-        spheres = self._shapes.spheres
-        sphere = spheres.get(radius_m)
-        if sphere is None:
-            sphere = spheres[radius_m] = fcl.CollisionObject(fcl.Sphere(radius_m))
+        sphere = self._shapes.of(radius_m)
         sphere.setTranslation(np.asarray(p, np.float64))
         return sphere
 

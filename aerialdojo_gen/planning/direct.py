@@ -50,6 +50,16 @@ def _proven_free(
     return True
 
 
+@njit(cache=True, inline="always")
+def _leg_end(
+    leg: int, x: float, y: float, z: float, ax: float, ay: float, bx: float, by: float, lift: float
+) -> tuple[float, float, float]:
+    """End of one of three legs: two level displacements and a lift."""
+    if leg == 2:
+        return x, y, z + lift
+    return (x + ax, y + ay, z) if leg == 0 else (x + bx, y + by, z)
+
+
 @njit(cache=True, error_model="numpy")
 def _any_order_proven_free(
     x: float, y: float, z: float, ax: float, ay: float, bx: float, by: float, lift: float, radius: float,
@@ -75,13 +85,7 @@ def _any_order_proven_free(
             beyond = corner | (1 << leg)
             if beyond == corner or (reached >> beyond) & 1:
                 continue
-            qx, qy, qz = px, py, pz
-            if leg == 0:
-                qx, qy = px + ax, py + ay
-            elif leg == 1:
-                qx, qy = px + bx, py + by
-            else:
-                qz = pz + lift
+            qx, qy, qz = _leg_end(leg, px, py, pz, ax, ay, bx, by, lift)
             if _proven_free(px, py, pz, qx, qy, qz, radius, ox, oy, oz, cell, field):
                 reached |= 1 << beyond
                 if beyond == 7:
@@ -157,13 +161,7 @@ def direct_legs(
         px, py, pz, extra = x, y, z, 0.0
         for i in range(3):
             leg = _ORDERS[o, i]
-            qx, qy, qz = px, py, pz
-            if leg == 0:
-                qx, qy = px + na * ax, py + na * ay
-            elif leg == 1:
-                qx, qy = px + nb * bx, py + nb * by
-            else:
-                qz = pz + sign * nz
+            qx, qy, qz = _leg_end(leg, px, py, pz, na * ax, na * ay, nb * bx, nb * by, sign * nz)
             if qx == px and qy == py and qz == pz:
                 continue
             if not inside(qx, qy, qz, grid.lower, grid.upper) or not segment_free(

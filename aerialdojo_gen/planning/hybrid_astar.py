@@ -126,12 +126,6 @@ def _slot(key: int, now: int, keys: Ints, stamps: Int32s) -> int:
     return ~slot
 
 
-@njit(cache=True, inline="always")
-def _blocker_slot(x: float, y: float, z: float) -> int:
-    """Slot of an edge in the blocker cache, given the edge's middle in metres."""
-    return (int(x) * 73 + int(y) * 7919 + int(z) * 104729) & (_N_BLOCKERS - 1)
-
-
 @njit(cache=True)
 def _legs_to(node: int, parents: Int32s, moves: NDArray[np.int8]) -> tuple[Ints, Ints]:
     """Directions and metres of the translations from the start to a state, and of three more legs of 0 m."""
@@ -278,7 +272,8 @@ def search(
         if clearance_known:
             g += edge_extra[entry]
         elif parent >= 0:
-            blocker_slot = _blocker_slot((px + x) / 2 - ox, (py + y) / 2 - oy, (pz + z) / 2 - oz)
+            u, v, w = int((px + x) / 2 - ox), int((py + y) / 2 - oy), int((pz + z) / 2 - oz)
+            blocker_slot = (u * 73 + v * 7919 + w * 104729) & (_N_BLOCKERS - 1)
             found = find_blocker(px, py, pz, x, y, z, o.radius, grid, False, blockers[blocker_slot])
             if found != FREE:
                 blockers[blocker_slot] = found

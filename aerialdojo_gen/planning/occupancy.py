@@ -35,7 +35,7 @@ class Occupancy:
 
 
 @njit(cache=True)
-def _apart(ax: float, ay: float, az: float, corners: Floats, x: float, y: float, z: float, half: float) -> bool:
+def _separates(ax: float, ay: float, az: float, corners: Floats, x: float, y: float, z: float, half: float) -> bool:
     """Whether an axis separates a triangle (3, 3) from the cube about (x, y, z)."""
     low, high = np.inf, -np.inf
     for k in range(3):
@@ -64,17 +64,17 @@ def _mark_touched(tri: Floats, origin: Floats, cell: float, slack: float, occupi
                 y = origin[1] + (j + 0.5) * cell
                 for k in range(first[2], last[2] + 1):
                     z = origin[2] + (k + 0.5) * cell
-                    apart = occupied[i, j, k] or _apart(nx, ny, nz, p, x, y, z, half)
+                    separate = occupied[i, j, k] or _separates(nx, ny, nz, p, x, y, z, half)
                     for m in range(3):
-                        if apart:
+                        if separate:
                             break
                         ex, ey, ez = (
                             p[(m + 1) % 3, 0] - p[m, 0], p[(m + 1) % 3, 1] - p[m, 1], p[(m + 1) % 3, 2] - p[m, 2],
                         )  # fmt: skip
-                        apart = (
-                            _apart(0.0, -ez, ey, p, x, y, z, half)
-                            or _apart(ez, 0.0, -ex, p, x, y, z, half)
-                            or _apart(-ey, ex, 0.0, p, x, y, z, half)
+                        separate = (
+                            _separates(0.0, -ez, ey, p, x, y, z, half)
+                            or _separates(ez, 0.0, -ex, p, x, y, z, half)
+                            or _separates(-ey, ex, 0.0, p, x, y, z, half)
                         )
-                    if not apart:
+                    if not separate:
                         occupied[i, j, k] = True

@@ -158,17 +158,14 @@ class Planner:
             return self.plan_target(goal_pose, start_pose)[0]
         c, min_reach_m = self.config, 0.0
         for _ in range(_TRIES):
-            with self._near_field.between(goal_pose, start_pose, min_reach_m) as found:
-                if found.cost is None:
-                    return Route("NO_PATH") if found.unreachable else self.plan_target(goal_pose, start_pose)[0]
-                cells, moves = self.grid.arrays, self.grid.moves
-                length = lengths_at(
-                    start_pose[None, :3], goal_pose[:3], cells, moves, found.cost, self._clearance_cost
-                )
-                route = self._estimate(start_pose, goal_pose, float(length[0]))
-                if route.outcome != "NOT_NEEDED":
-                    return route
-                route = self._search(start_pose, goal_pose, route.cost_to_go_m, found.cost, c.ladder[:1])
+            found = self._near_field.between(goal_pose, start_pose, min_reach_m)
+            if found.cost is None:
+                return Route("NO_PATH") if found.unreachable else self.plan_target(goal_pose, start_pose)[0]
+            (length,) = self._lengths(start_pose[None], goal_pose, found.cost)
+            route = self._estimate(start_pose, goal_pose, float(length))
+            if route.outcome != "NOT_NEEDED":
+                return route
+            route = self._search(start_pose, goal_pose, route.cost_to_go_m, found.cost, c.ladder[:1])
             min_reach_m = float(self._memory[c.ladder[0].budget].highest[0])
             if route.outcome != "SOLVED":
                 break
@@ -198,14 +195,7 @@ class Planner:
         blocked = [self._blocked(s) for s in start_poses]
         if not all(blocked):
             self._expand(goal_pose)
-        values = lengths_at(
-            np.ascontiguousarray(start_poses[:, :3]),
-            goal_pose[:3],
-            self.grid.arrays,
-            self.grid.moves,
-            self._cost,
-            self._clearance_cost,
-        )
+        values = self._lengths(start_poses, goal_pose, self._cost)
         return [
             Route("START_IN_COLLISION") if b else self._estimate(s, goal_pose, float(v))
             for s, b, v in zip(start_poses, blocked, values, strict=True)
@@ -262,6 +252,11 @@ class Planner:
             return np.asarray(seed_goal(*goal, c.max_approach_m, g.radius_m, g.arrays, g.moves, cost, prefer))
 
         return NearField(g, self._clearance_cost, c.ladder[0].weight, c.max_approach_m, self._bound_m, seed)
+
+    def _lengths(self, starts: Floats, goal: Floats, cost: Singles) -> Floats:
+        """Lengths of the cheapest grid paths from starts (n, 4)."""
+        points, grid = np.ascontiguousarray(starts[:, :3]), self.grid
+        return np.asarray(lengths_at(points, goal[:3], grid.arrays, grid.moves, cost, self._clearance_cost))
 
     def _estimate(self, start: Floats, goal: Floats, value: float) -> Route:
         if not value <= self._longest_m:

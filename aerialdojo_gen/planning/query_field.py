@@ -13,8 +13,7 @@ from a grid path, an upper bound of the shortest.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -175,25 +174,24 @@ class NearField:
         self._weight, self._approach, self._bound = weight, approach, bound
         self._cost = np.full(grid.moves.shape, np.inf, np.float32)
         self._memory, self._path = make_memory(grid.moves.shape), make_path_arrays()
+        self._last = (0, np.empty(0, np.int32))  # Columns that the last query wrote, and its seeds
 
-    @contextmanager
-    def between(self, goal: Floats, start: Floats, min_reach: float) -> Iterator[QueryResult]:
-        """Yield the costs that a search from a start (4,) to a goal (4,) needs; valid until the block ends."""
+    def between(self, goal: Floats, start: Floats, min_reach: float) -> QueryResult:
+        """Compute the costs that a search from a start (4,) to a goal (4,) needs; valid until the next call."""
         cost, cells, moves, weight = self._cost, self._grid.arrays, self._grid.moves, self._weight
+        _clear(*self._last, cost, self._memory)
         seeds = self._seed(goal, cost)
+        self._last = (0, seeds)
         seeded = cost.ravel()[seeds]
         # The start is within the bound if one of the cells around it is.
         max_cost = self._bound + reach_margin(cells.cell, 1.0)
         path = short_path_cost(seeds, *start[:3], max_cost, cells, moves, self._clearance_cost, cost, self._path)
         if path == _GAVE_UP or not math.isfinite(path):
-            yield QueryResult(None, path != _GAVE_UP, 0.0)
-            return
+            return QueryResult(None, path != _GAVE_UP, 0.0)
         cost.reshape(-1)[seeds] = seeded
         reach = max(weight * path + _SURPLUS_M, min_reach)
         whole = reach + reach_margin(cells.cell, weight)
         area = Area(start[:3], goal[:3], self._approach, weight, whole, self._bound, math.inf)
         written, _ = expand(seeds, area, cells, moves, cost, self._clearance_cost, self._memory)
-        try:
-            yield QueryResult(cost, False, reach)
-        finally:
-            _clear(written, seeds, cost, self._memory)
+        self._last = (written, seeds)
+        return QueryResult(cost, False, reach)

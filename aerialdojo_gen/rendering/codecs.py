@@ -112,21 +112,15 @@ class VideoWriter(AbstractContextManager["VideoWriter"]):
             for packet in stream.encode(_frame(modality, frames[modality])):
                 self._container.mux(packet)
 
-    def close(self) -> None:
-        """Flush the encoders and close the file."""
-        for stream in self._streams.values():
-            for packet in stream.encode():
-                self._container.mux(packet)
-        self._container.close()
-
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Finish the file, or only close it where the block failed."""
+        """Flush the encoders, unless the block failed, and close the file."""
         if kind is None:
-            self.close()
-        else:
-            self._container.close()
+            for stream in self._streams.values():
+                for packet in stream.encode():
+                    self._container.mux(packet)
+        self._container.close()
 
 
 def _frame(modality: str, picture: Bytes | NDArray[np.uint16]) -> Any:

@@ -25,7 +25,7 @@ _ENDLESS_M = 1e9
 _CLOUDS_PX = 256
 # Cells of the map of heights along the scene's longer side, and by how much it is blurred, metres.
 _HEIGHT_CELLS, _BLUR_M = 256, 1.6
-# The highest that it tells from higher ones, above the lowest ground, metres.
+# The highest that it distinguishes from higher ones, above the lowest ground, metres.
 REACH_M = 60.0
 _COARSE_PX, _WINDOWS_STAY = 256, 3.0
 # Surfaces in which the sky is mirrored.

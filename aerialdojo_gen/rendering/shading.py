@@ -69,14 +69,10 @@ def lit_in_haze(base: Floats, normal: Floats, unit: Floats, distance: Floats, li
     from_sky = (light.ground_rgb + (light.sky_rgb - light.ground_rgb) * up) * side
     linear = (base @ MUTE.T / 255.0) ** 2 * (from_sky + light.sun_rgb * np.maximum(normal @ light.sun, 0.0)[:, None])
     value = linear / (linear + _TOE) * _GAIN * 255.0
-    haze = np.maximum(distance**2 / (distance**2 + light.haze_m**2), _smoothstep(2.0 * distance / _END_M - 1.0))
+    end = np.clip(2.0 * distance / _END_M - 1.0, 0.0, 1.0)
+    haze = np.maximum(distance**2 / (distance**2 + light.haze_m**2), end * end * (3.0 - 2.0 * end))
     sky = light.horizon + (light.zenith - light.horizon) * np.sqrt(np.maximum(unit[:, 2:], 0.0))
     return np.asarray(value + (sky - value) * haze[:, None])
-
-
-def _smoothstep(t: Floats) -> Floats:
-    t = np.clip(t, 0.0, 1.0)
-    return np.asarray(t * t * (3.0 - 2.0 * t))
 
 
 @njit(cache=True)
@@ -158,17 +154,6 @@ def _slope(w: Floats, row: int, col: int, down: int, right: int) -> float:
 
 
 @njit(cache=True)
-def _inverse_depths(depth: Singles, surface: Int32s) -> Floats:
-    """Inverse depth of every pixel; 0 of the sky."""
-    w = np.zeros(depth.shape)
-    for row in range(depth.shape[0]):
-        for col in range(depth.shape[1]):
-            if surface[row, col] >= 0:
-                w[row, col] = 1.0 / depth[row, col]
-    return w
-
-
-@njit(cache=True)
 def _turned(pose: Floats, x: float, y: float, z: float) -> tuple[float, float, float]:
     """A direction of the camera's frame in the world's."""
     return (
@@ -216,7 +201,9 @@ def _shade(
     height, width = depth.shape
     sun = rows[0]
     flat = math.sqrt(sun[0] * sun[0] + sun[1] * sun[1]) + 1e-9
-    base, sky, w = np.empty(3), np.empty(3), _inverse_depths(depth, surface)
+    base, sky = np.empty(3), np.empty(3)
+    # Inverse depths; 0 of the sky.
+    w = np.where(surface >= 0, 1.0 / depth.astype(np.float64), 0.0)
     for row in range(height):
         y = (row + 0.5 - height / 2.0) / focal
         for col in range(width):

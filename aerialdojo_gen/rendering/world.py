@@ -131,17 +131,8 @@ class PyBulletRenderer(Renderer):
     def render(self, camera: Camera, world_from_camera: Floats, instances: bool = False) -> Picture:
         """Take a picture; the instance id map is ray-cast."""
         albedo, depth, surface = self.rasterise(camera, world_from_camera)
-        rgb = shade(
-            camera,
-            world_from_camera,
-            albedo,
-            depth,
-            surface,
-            self._light,
-            self._shadow_map(),
-            self._clouds,
-            self._heights,
-        )
+        lit_by = self._light, self._shadow_map(), self._clouds, self._heights
+        rgb = shade(camera, world_from_camera, albedo, depth, surface, *lit_by)
         self._backdrop.paint(rgb, surface < 0, camera, world_from_camera)
         if not instances:
             return Picture(rgb, depth)

@@ -3,7 +3,7 @@ import pytest
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 from support.flying import town
-from support.handmade import box, instance, scene
+from support.handmade import scene
 
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.connectivity import MOVES, move_lengths
@@ -95,14 +95,3 @@ def test_the_bound_is_kept_and_in_the_open_a_column_is_visited_once():
     # Beyond the bound only the vertical goes on, in columns that hold something within it.
     beyond = np.isfinite(some) & (some > 8.0)
     assert (some.min(axis=2)[beyond.any(axis=2)] <= 8.0).all()
-
-
-def test_ways_back_round_a_wall_are_found():
-    """Into a court with its gate on the far side: there visits must run against their first order."""
-    walls = [box((3, -5, 0), (3.4, 5, 9.9)), box((3, -5, 0), (13, -4.6, 9.9)), box((3, 4.6, 0), (13, 5, 9.9)),
-             box((3, -5, 7), (13, 5, 7.4)), box((12.6, -5, 0), (13, 3, 9.9))]  # fmt: skip
-    grid = ClearanceGrid.build(scene(instance("court", *walls), half=20.0, ceiling=10.0))
-    cost, _, _ = field(grid, (0.0, 0.0, 3.0))
-    # Round the corner at (13, 5) and in by the gate between y = 3 and 4.6.
-    assert 25 < cost_at(5.0, 0.0, 3.0, grid.arrays, cost) < 40
-    assert cost_at(5.0, 0.0, 3.0, grid.arrays, cost) > cost_at(12.0, 3.8, 3.0, grid.arrays, cost) + 6

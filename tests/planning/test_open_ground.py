@@ -103,35 +103,28 @@ def test_no_plan_starts_ends_or_leads_below_the_ground():
     assert not any(buried(field, along(r.poses[:, :3], 0.05) + shift).any() for r in solved)
 
 
-def test_what_is_built_over_open_ground_is_flown_under():
+def test_roofs_and_overhangs_are_flown_under_and_earth_and_rock_are_closed():
     field = hills(5, cells=16, relief_m=4.0)
     roof = trimesh.Trimesh([[8, 8, 9], [20, 8, 9], [20, 20, 9], [8, 20, 9]], [[0, 1, 2], [0, 2, 3]], process=False)
-    deck = box((2, 22, 8.5), (30, 26, 9.0))
-    scene, shift = adopted(field, roof, deck)
-    grid = ClearanceGrid.build(scene)
-    for x, y in ((14.1, 14.2), (16.3, 24.1)):
-        assert grid.reachable(np.array([x, y, 7.0]) - shift)
-        assert not grid.below_ground(np.array([x, y, 7.0]) - shift)
-        assert not grid.reachable(np.array([x, y, field.z(np.array([[x, y]]))[0] - 0.6]) - shift)
-
-
-def test_an_overhang_is_open_and_the_rock_above_it_is_not():
+    scene, shift = adopted(field, roof, box((2, 22, 8.5), (30, 26, 9.0)))
+    under = np.array([[14.1, 14.2], [16.3, 24.1]])
+    cases = [(scene, shift, np.c_[under, [7.0, 7.0]], np.c_[under, field.z(under) - 0.6])]
     # A section along x, drawn out along y: a floor, a back wall, a ceiling that comes forward, and a slope on top.
     section = np.array([[0, 2], [14, 2], [14, 6], [8, 6], [8, 7], [20, 9], [30, 3]], dtype=float)
-    y = np.arange(0.0, 31.0, 1.0)
-    vertices = np.array([[x, v, z] for v in y for x, z in section])
+    vertices = np.array([[x, v, z] for v in np.arange(0.0, 31.0) for x, z in section])
     n = len(section)
     cell = np.array(
         [[i * n + j, i * n + j + 1, (i + 1) * n + j + 1, (i + 1) * n + j] for i in range(30) for j in range(6)]
     )
-    sheet = trimesh.Trimesh(vertices, np.concatenate([cell[:, :3], cell[:, [0, 2, 3]]]), process=False)
-    scene, _ = import_mesh(NAME, [raw(sheet, "Cliff")])
-    shift = np.array([15.0, 15.0, 2.0])
-    grid = ClearanceGrid.build(scene)
-    assert grid.ground is not None
-    assert grid.reachable(np.array([12.0, 15.0, 4.0]) - shift)
-    for inside in ((12.0, 15.0, 7.0), (18.0, 15.0, 4.0), (26.0, 15.0, 3.5)):
-        assert not grid.reachable(np.array(inside) - shift)
+    cliff = trimesh.Trimesh(vertices, np.concatenate([cell[:, :3], cell[:, [0, 2, 3]]]), process=False)
+    scene, _ = import_mesh(NAME, [raw(cliff, "Cliff")])
+    rock = [(12.0, 15.0, 7.0), (18.0, 15.0, 4.0), (26.0, 15.0, 3.5)]
+    cases.append((scene, np.array([15.0, 15.0, 2.0]), [(12.0, 15.0, 4.0)], rock))
+    for scene, shift, free, closed in cases:
+        grid = ClearanceGrid.build(scene)
+        assert grid.ground is not None
+        assert all(grid.reachable(place - shift) and not grid.below_ground(place - shift) for place in free)
+        assert not any(grid.reachable(place - shift) for place in closed)
 
 
 def test_solid_ground_is_no_sheet_and_neither_is_a_canopy_over_ground_that_was_laid():

@@ -1,4 +1,4 @@
-"""What a picture leaves out as hidden could not have been seen: pictures are those of all triangles, to the bit."""
+"""Triangles of the OpenGL renderer: what is left out as hidden could not have been seen; which edges are smooth."""
 
 import numpy as np
 import pytest
@@ -8,9 +8,12 @@ from support.rendered import boxes_and_a_wall, courtyard
 from aerialdojo_gen import GlRenderer
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.rendering.gl import clip_from_world
+from aerialdojo_gen.rendering.gl_geometry import VERTEX, smooth
 from aerialdojo_gen.rendering.gl_programs import read_pixels
 from aerialdojo_gen.rendering.picture import FAR_M, NEAR_M
 from aerialdojo_gen.rendering.world import PyBulletRenderer
+from aerialdojo_gen.scenes.mesh import Mesh
+from aerialdojo_gen.scenes.shapes import box, sphere
 from aerialdojo_gen.store.schemas import VIEWS
 
 
@@ -97,3 +100,25 @@ def test_pictures_of_many_bodies_are_those_of_each(kind, make, size):
     assert (other.shape, empty.shape) == ((3, 1, 20, 20, 3), (0, *rgb.shape[1:]))
     assert len(np.unique(rgb)) > 20
     assert len(np.unique(instance)) > 3
+
+
+def rows_of(body: Mesh) -> np.ndarray:
+    corners = body.vertices[body.faces]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    rows = np.zeros((len(corners), 3), VERTEX)
+    rows["position"], rows["normal"] = corners, (normal / np.linalg.norm(normal, axis=1, keepdims=True))[:, None]
+    return rows
+
+
+def test_each_group_is_smooth_by_its_own_angle_and_what_has_none_is_flat() -> None:
+    ball, crate = rows_of(sphere(radius=1.0)), rows_of(box(size=[1.0, 2.0, 3.0]))
+    two = np.concatenate([ball[::2], ball[1::2]])  # Of two materials
+    rows = np.concatenate([ball, ball, two, crate])
+    flat = rows["normal"].copy()
+    smooth(rows, np.repeat([1, -1, 0, 2], [*[len(ball)] * 3, len(crate)]), np.array([0.7, 0.999, 0.45]))
+    soft, others = np.split(np.arange(len(rows)), [2 * len(ball), 3 * len(ball)])[1], np.ones(len(rows), bool)
+    others[soft] = False
+    np.testing.assert_allclose(rows["normal"][others], flat[others], atol=1e-6)
+    out = rows["position"][soft] / np.linalg.norm(rows["position"][soft], axis=2, keepdims=True)
+    assert (rows["normal"][soft] * out).sum(axis=2).min() > 0.99
+    assert (flat[soft] * out).sum(axis=2).min() < 0.98

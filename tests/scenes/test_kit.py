@@ -7,7 +7,7 @@ import pytest
 from support.layout_checks import ASSETS, catalogue, drawn
 
 from aerialdojo_gen.base.errors import AssetError
-from aerialdojo_gen.rendering.kit_gallery import settings_of, uses_of
+from aerialdojo_gen.rendering.gallery import settings_of, uses_of
 from aerialdojo_gen.scenes.kit import kit
 from aerialdojo_gen.scenes.plans.build import build_tables
 
