@@ -33,14 +33,6 @@ from aerialdojo_gen.scenes.terrain import flat_terrain
 from aerialdojo_gen.scenes.vocabulary import SHAPES, part_mesh
 
 
-def prop_height(site: Site, category: str, variant: str | None, x: float, y: float) -> float:
-    """Height of a thing that stands at z = 0, metres, in the variant that it would have."""
-    chosen = variant if variant is not None else site.next_variant(category)
-    return float(
-        site.catalogue.instantiate(category, "trial", site.rng_for("trial"), (x, y, 0.0), 0.0, chosen).bounds[1, 2]
-    )
-
-
 def poses_of(site: Site, pattern: Pattern) -> Iterator[Pose]:
     """Yield the poses of a pattern."""
     if pattern.along is not None:
@@ -300,8 +292,11 @@ class _Building:
             z = self._site.ground_z(x, y) + above_m
         if entry.sunk is not None:
             share, most_m = entry.sunk
-            height_m = prop_height(self._site, category, variant, x, y)
-            z = (z or 0.0) - min(share * height_m, most_m)
+            look = variant if variant is not None else self._site.next_variant(category)
+            trial = self._site.catalogue.instantiate(
+                category, "trial", self._site.rng_for("trial"), (x, y, 0.0), variant=look
+            )
+            z = (z or 0.0) - min(share * float(trial.bounds[1, 2]), most_m)
         own = {key: getattr(thing, key) for key in ("design", "scale", "roles", "params", "attributes")}
         own = {key: value for key, value in own.items() if value}
         one = Placement(
