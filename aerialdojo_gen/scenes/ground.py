@@ -121,10 +121,10 @@ def _draped_mesh(layer: Surface, tiles: _Tiles) -> Mesh:
     pieces = [Mesh(corners, faces[touched[inside]])] if inside.any() else []
     cut = touched[~inside]
     parts = _cut(layer.area, tiles.plans.geometries[cut])
-    pieces = [polygons_of(part) for part in parts.tolist()]
-    if any(pieces):
-        flat, whose, cut_faces = triangulate_all([piece for some in pieces for piece in some])
-        tile = np.repeat(cut, [len(some) for some in pieces])
+    visible = [polygons_of(part) for part in parts.tolist()]
+    if any(visible):
+        flat, whose, cut_faces = triangulate_all([piece for some in visible for piece in some])
+        tile = np.repeat(cut, [len(some) for some in visible])
         z = np.empty(len(flat))
         for k, some in zip(
             tile.tolist(), np.split(np.arange(len(flat)), np.flatnonzero(np.diff(whose)) + 1), strict=True
