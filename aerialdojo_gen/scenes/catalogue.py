@@ -126,7 +126,11 @@ class Catalogue:
         refuse_unknown(own.roles or {}, prop.roles, f"{prop.source} roles")
         words = dict(kind.attributes) | dict(own.attributes or {})
         if prop.builder is not None:
-            assembly = self._built(prop, prop.builder, sizes, surfaces, rng)
+            try:
+                pieces = [_Piece(role, body) for role, body in builders()[prop.builder](rng, sizes)]
+            except (ValueError, KeyError) as error:
+                raise AssetError(f"{prop.source} builder {prop.builder!r}: {error}") from error
+            assembly = self._textured(prop, _Body(pieces), surfaces)
         else:
             # Most variants of a category differ in their surfaces alone.
             signs = tuple(words.items()) if any(p["shape"] == "text" for p in prop.parts) else ()
@@ -192,20 +196,6 @@ class Catalogue:
         if total > MAX_TRIANGLES:
             raise AssetError(f"{prop.source} has {total:,} triangles, the maximum is {MAX_TRIANGLES:,}")
         return _Body(meshes)
-
-    def _built(
-        self,
-        prop: Category,
-        builder: str,
-        sizes: Mapping[str, float],
-        surfaces: Mapping[str, str],
-        rng: np.random.Generator,
-    ) -> _Assembly:
-        try:
-            meshes = [_Piece(role, body) for role, body in builders()[builder](rng, sizes)]
-        except (ValueError, KeyError) as error:
-            raise AssetError(f"{prop.source} builder {builder!r}: {error}") from error
-        return self._textured(prop, _Body(meshes), surfaces)
 
     def _textured(self, prop: Category, body: _Body, surfaces: Mapping[str, str]) -> _Assembly:
         by_material: dict[str, list[_Piece]] = {}

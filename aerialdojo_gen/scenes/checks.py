@@ -50,8 +50,8 @@ def props_of(scene: Scene, catalogue: Catalogue) -> list[Instance]:
 
 def targets_of(scene: Scene, catalogue: Catalogue) -> list[Instance]:
     """List the things that tasks may ask for, plants left out."""
-    known = set(catalogue.targets)
-    return [i for i in scene.instances if i.category in known and catalogue[i.category].kind != "vegetation"]
+    targets = set(catalogue.targets)
+    return [i for i in scene.instances if i.category in targets and catalogue[i.category].kind != "vegetation"]
 
 
 def floating(

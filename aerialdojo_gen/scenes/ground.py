@@ -67,11 +67,11 @@ def visible_surfaces(extent: Polygon, base: str, surfaces: Sequence[Surface]) ->
     covered: BaseGeometry = Polygon()
     layers = []
     for layer in reversed(groups):
-        seen = _areal(_snapped(layer.area).intersection(_snapped(extent)))
-        seen = shapely.difference(seen, covered, grid_size=_GRID_M)
-        covered = _areal(shapely.union(covered, _areal(seen), grid_size=_GRID_M))
-        if seen.area > _MIN_AREA_M2:
-            layers.append(Surface(seen, layer.material, layer.rise_m, layer.edge))
+        visible = _areal(_snapped(layer.area).intersection(_snapped(extent)))
+        visible = shapely.difference(visible, covered, grid_size=_GRID_M)
+        covered = _areal(shapely.union(covered, _areal(visible), grid_size=_GRID_M))
+        if visible.area > _MIN_AREA_M2:
+            layers.append(Surface(visible, layer.material, layer.rise_m, layer.edge))
     return layers[::-1]
 
 
@@ -121,10 +121,10 @@ def _draped_mesh(layer: Surface, tiles: _Tiles) -> Mesh:
     pieces = [Mesh(corners, faces[touched[inside]])] if inside.any() else []
     cut = touched[~inside]
     parts = _cut(layer.area, tiles.plans.geometries[cut])
-    seen = [polygons_of(part) for part in parts.tolist()]
-    if any(seen):
-        flat, whose, cut_faces = triangulate_all([piece for some in seen for piece in some])
-        tile = np.repeat(cut, [len(some) for some in seen])
+    visible = [polygons_of(part) for part in parts.tolist()]
+    if any(visible):
+        flat, whose, cut_faces = triangulate_all([piece for some in visible for piece in some])
+        tile = np.repeat(cut, [len(some) for some in visible])
         z = np.empty(len(flat))
         for k, some in zip(
             tile.tolist(), np.split(np.arange(len(flat)), np.flatnonzero(np.diff(whose)) + 1), strict=True

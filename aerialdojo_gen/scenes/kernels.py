@@ -32,8 +32,8 @@ def _cross(a: Triple, b: Triple) -> Triple:
 
 
 @njit(cache=True, error_model="numpy")
-def _beside(a: Triple, b: Triple) -> Triple:
-    """What is left of one vector beside another, of length 1."""
+def _rejected(a: Triple, b: Triple) -> Triple:
+    """The part of a vector at right angles to another, of length 1 (its rejection)."""
     along = _dot(a, b)
     return a[0] - b[0] * along, a[1] - b[1] * along, a[2] - b[2] * along
 
@@ -88,7 +88,7 @@ def limb_vertices(line: Floats, radii: Floats, rings: int, cos: Floats, sin: Flo
         way = _unit(way)
         if i == 0 and not abs(way[0]) < 0.9:
             side = (0.0, 1.0, side[2])
-        side = _unit(_beside(side, way))
+        side = _unit(_rejected(side, way))
         other = _cross(way, side)
         for k in range(sides):
             for j in range(3):
@@ -123,9 +123,9 @@ def swept_rings(line: Floats, ring: Floats, closed: bool) -> Floats:
         middle = _unit(middle)
         level = _cross(middle, (0.0, 0.0, 1.0))
         # Nearly vertical stretches have no level direction of their own: carry the last one on.
-        right = _unit(level if np.sqrt(_dot(level, level)) > 0.1 else _beside(right, middle))
+        right = _unit(level if np.sqrt(_dot(level, level)) > 0.1 else _rejected(right, middle))
         above = _cross(right, middle)
-        bend = _beside((after[0] - before[0], after[1] - before[1], after[2] - before[2]), middle)
+        bend = _rejected((after[0] - before[0], after[1] - before[1], after[2] - before[2]), middle)
         bends, stretch = np.sqrt(_dot(bend, bend)) > 1e-9, 0.0
         if bends:
             bend = _unit(bend)

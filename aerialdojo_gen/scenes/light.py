@@ -8,7 +8,6 @@ from datetime import date
 from typing import Annotated, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, Field, field_validator, model_validator
 
 from aerialdojo_gen.base import rng
@@ -87,9 +86,8 @@ def chosen_light(own: Light, name: str, seed: int = 0, *key: object) -> Light:
 
 def _lowered(sun: Sun) -> Sun:
     """Bring the sun down to dusk, in the same direction."""
-    at: NDArray[np.float64] = np.asarray(sun, dtype=np.float64)
-    flat = float(np.hypot(at[0], at[1]))
-    most = math.tan(math.radians(_DUSK_DEG))
-    x, y, z = (at[0], at[1], min(at[2], flat * most)) if flat > 1e-6 else (1.0, 0.0, most)
-    x, y, z = np.array([x, y, z]) / math.sqrt(x * x + y * y + z * z)
-    return float(x), float(y), float(z)
+    (x, y, z), most = sun, math.tan(math.radians(_DUSK_DEG))
+    flat = float(np.hypot(x, y))
+    x, y, z = (x, y, min(z, flat * most)) if flat > 1e-6 else (1.0, 0.0, most)
+    length = math.sqrt(x * x + y * y + z * z)
+    return x / length, y / length, z / length

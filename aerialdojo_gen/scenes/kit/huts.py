@@ -244,30 +244,30 @@ def _mudbrick_house(site: Site, house: MudbrickHouse) -> float:
     ]
     front = depth / 2 + 0.02
 
-    def put(body: Mesh, u: float, v: float, up: float) -> Mesh:
+    def placed(body: Mesh, u: float, v: float, up: float) -> Mesh:
         return posed(body, rotation(0.0, 0.0, yaw_deg), (*frame.at(u, v), z + up))
 
     door = float(rng.choice(["-1", "1"])) * 0.18 * width
     paint = str(rng.choice(["planks:#6a4a30", "planks:#2f6a78", "planks:#7a3c2c"]))
     parts += [
-        (paint, put(box(size=(0.08, 1.1, 2.0)), front, door, 0.0)),
-        ("wood:#6b4a30", put(box(size=(0.24, 1.7, 0.2)), front, door, 2.0)),
+        (paint, placed(box(size=(0.08, 1.1, 2.0)), front, door, 0.0)),
+        ("wood:#6b4a30", placed(box(size=(0.24, 1.7, 0.2)), front, door, 2.0)),
     ]
     for v in np.linspace(-0.38, 0.38, max(int(width // 2.2), 2)) * width:
         if abs(v - door) > 1.1:
-            parts.append(("#3a2c20", put(box(size=(0.06, 0.55, 0.7)), front, float(v), 1.2)))
-            parts.append(("wood:#6b4a30", put(box(size=(0.12, 0.85, 0.12)), front, float(v), 1.9)))
+            parts.append(("#3a2c20", placed(box(size=(0.06, 0.55, 0.7)), front, float(v), 1.2)))
+            parts.append(("wood:#6b4a30", placed(box(size=(0.12, 0.85, 0.12)), front, float(v), 1.9)))
             if height > 5.0:
-                parts.append(("#3a2c20", put(box(size=(0.06, 0.55, 0.8)), front, float(v), 4.1)))
+                parts.append(("#3a2c20", placed(box(size=(0.06, 0.55, 0.8)), front, float(v), 4.1)))
     beam = rotated(cylinder(radius=0.1, height=0.55, segments=6), rotation(0.0, 90.0, 0.0))
     beams_at = np.arange(-width / 2 + 0.6, width / 2 - 0.4, 0.9).tolist()
-    parts += [("wood:#7a5838", put(beam, front - 0.1, v, height - 0.45)) for v in beams_at]
-    parts += [(wall, put(box(size=(0.8, 0.45, 0.45)), a, b, height + _PARAPET_M))
+    parts += [("wood:#7a5838", placed(beam, front - 0.1, v, height - 0.45)) for v in beams_at]
+    parts += [(wall, placed(box(size=(0.8, 0.45, 0.45)), a, b, height + _PARAPET_M))
               for a, b in ((depth / 2 - 0.4, width / 2 - 0.23), (depth / 2 - 0.4, 0.23 - width / 2))]  # fmt: skip
     for k in range(int(height / 0.32)):
         u = -depth / 2 + 0.3 + k * 0.3
         if u < depth / 2 - 0.3:
-            parts.append((wall, put(box(size=(0.3, 0.9, 0.32 * (k + 1))), u, width / 2 + 0.46, 0.0)))
+            parts.append((wall, placed(box(size=(0.3, 0.9, 0.32 * (k + 1))), u, width / 2 + 0.46, 0.0)))
     site.add(None, "mudbrick_house", parts, footprint=plan.union(stair).buffer(0.1))
     return top + 0.01
 

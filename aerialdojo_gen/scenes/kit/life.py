@@ -53,10 +53,10 @@ def life(
     vehicles and riders (one for 30 m of lane, ten at most) stand in lanes, where the entries before have made some.
     """
     dressed = [v.name for v in site.catalogue["person"].variants if v.name.split("_")[0] in who]
-    known = sorted({v.name.split("_")[0] for v in site.catalogue["person"].variants})
+    groups = sorted({v.name.split("_")[0] for v in site.catalogue["person"].variants})
     for one in who:
-        if one not in known:
-            raise AssetError(unknown("no people", one, known))
+        if one not in groups:
+            raise AssetError(unknown("no people", one, groups))
     rng = site.rng_for("life", stream)
     spots = iter(poisson_disc(site.extent.buffer(-_RIM_M), _APART_M, rng, limit=6000))
     wet = [thing.bounds for thing in site.instances if any(p.material.startswith("water") for p in thing.parts)]

@@ -117,12 +117,12 @@ def _middles(triangles: Floats) -> Floats:
     longest = np.argmax((edges * edges).sum(axis=2), axis=1)
     rows = np.arange(len(triangles))
     middles = np.round((triangles[rows, longest] + triangles[rows, longest - 1]) / 2, 4)
-    found: dict[tuple[float, float], Floats] = {}
+    highest: dict[tuple[float, float], Floats] = {}
     for at in middles:
         key = (float(np.round(at[0], 2)), float(np.round(at[1], 2)))
-        if key not in found or at[2] > found[key][2]:
-            found[key] = at
-    return np.array(list(found.values())).reshape(-1, 3)
+        if key not in highest or at[2] > highest[key][2]:
+            highest[key] = at
+    return np.array(list(highest.values())).reshape(-1, 3)
 
 
 def _has_room(
@@ -150,28 +150,28 @@ def _box_of(thing: Instance) -> Polygon:
 
 def perch_on_wires(site: Site, category: str, number: int, rng: np.random.Generator) -> int:
     """Place birds in rows on wires, turned across them; returns how many."""
-    taken: list[Floats] = []
+    perches: list[Floats] = []
     for thing in site.instances:
         wires = _wires_of(site, thing) if thing.category in _WIRES else np.zeros((0, 2, 3))
         if not len(wires):
             continue
         caster = TriangleRayCaster(thing.vertices, thing.faces)
         for k in rng.permutation(len(wires))[:3]:
-            (a, b), room = wires[int(k)], min(int(rng.integers(2, _TOGETHER + 1)), number - len(taken))
+            (a, b), room = wires[int(k)], min(int(rng.integers(2, _TOGETHER + 1)), number - len(perches))
             long = math.hypot(b[0] - a[0], b[1] - a[1])
             first = float(rng.uniform(0.15, 0.5)) * long
             for j in range(room):
                 along = first + j * _PERCHED_M + float(rng.uniform(0.0, 0.15))
                 if along < long - 0.15:
-                    _perched(site, category, a + (b - a) * (along / long), b - a, caster, rng, taken)
-    return len(taken)
+                    _perched(site, category, a + (b - a) * (along / long), b - a, caster, rng, perches)
+    return len(perches)
 
 
 def _perched(
     site: Site, category: str, at: Floats, way: Floats, caster: TriangleRayCaster, rng: np.random.Generator,
-    taken: list[Floats],
+    perches: list[Floats],
 ) -> None:  # fmt: skip
-    """Place a bird on the ridge of a wire near a point, where it has room, and note its place as taken."""
+    """Place a bird on the ridge of a wire near a point, where it has room, and note its place."""
     yaw = math.atan2(way[1], way[0])
     across = np.array([-math.sin(yaw), math.cos(yaw), 0.0])
     from_above = at + np.linspace(-0.05, 0.05, 21)[:, None] * across + np.array([0.0, 0.0, 0.5])
@@ -182,11 +182,11 @@ def _perched(
     x, y, _ = from_above[top > float(top.max()) - 1e-3].mean(axis=0).tolist()
     z = float(at[2] + top.max())
     bird = np.array([x, y, z])
-    if not site.is_free(x, y, 0.25, z + 0.05, 0.4) or any(np.abs(bird - one).max() < _BIRD_M for one in taken):
+    if not site.is_free(x, y, 0.25, z + 0.05, 0.4) or any(np.abs(bird - one).max() < _BIRD_M for one in perches):
         return
     side = 90.0 if rng.random() < 0.7 else -90.0
     site.place(Placement(category, x, y, math.degrees(yaw) + side, z=z, solid=False))
-    taken.append(bird)
+    perches.append(bird)
 
 
 def _wires_of(site: Site, thing: Instance) -> Floats:
@@ -231,14 +231,14 @@ def set_out_traffic(site: Site, number: int | None = None) -> int:
     """
     length_m = sum(line.length for line, _ in site.lanes)
     number = min(round(length_m / _PER_LANE_M), _MOST) if number is None else number
-    taken = _taken(site)
+    occupied = _occupied(site)
     placed = 0
     # Every lane has its turn before one has another.
     queues = [_spots(site, k) for k in range(len(site.lanes))]
     for turn in range(max(map(len, queues), default=0)):
         for k, queue in enumerate(queues):
             if turn < len(queue) and placed < number:
-                placed += _placed(site, k, queue[turn], site.rng_for("traffic", k, turn), taken)
+                placed += _placed(site, k, queue[turn], site.rng_for("traffic", k, turn), occupied)
     return placed
 
 
@@ -260,7 +260,7 @@ def _spots(site: Site, k: int) -> list[tuple[float, bool]]:
 
 
 def _placed(
-    site: Site, k: int, spot: tuple[float, bool], rng: np.random.Generator, taken: Sequence[tuple[Polygon, bool]]
+    site: Site, k: int, spot: tuple[float, bool], rng: np.random.Generator, occupied: Sequence[tuple[Polygon, bool]]
 ) -> bool:
     """Place one vehicle or rider whose front is at a spot of a lane, the first kind that has room there."""
     line, lane_m = site.lanes[k]
@@ -270,7 +270,7 @@ def _placed(
         long, wide, clear_m, _ = _DRIVES[kind]
         aside = max(lane_m / 2 - _AT_KERB_M, 0.0) if kind == "cyclist" else 0.0
         pose = _pose(line, spot[0] - long / 2, long, aside)
-        if pose is not None and _fits_lane(site, k, pose, (long, wide), clear_m, taken):
+        if pose is not None and _fits_lane(site, k, pose, (long, wide), clear_m, occupied):
             variants = site.catalogue[kind].variants
             choice = variants[int(rng.integers(len(variants)))].name
             return site.place(Placement(kind, *pose, choice), "skip") is not None
@@ -289,7 +289,12 @@ def _pose(line: LineString, s: float, long_m: float, aside_m: float) -> Pose | N
 
 
 def _fits_lane(
-    site: Site, k: int, pose: Pose, size_m: tuple[float, float], clear_m: float, taken: Sequence[tuple[Polygon, bool]]
+    site: Site,
+    k: int,
+    pose: Pose,
+    size_m: tuple[float, float],
+    clear_m: float,
+    occupied: Sequence[tuple[Polygon, bool]],
 ) -> bool:
     """Whether a vehicle stands level on its own lane, off junctions, clear of all else."""
     long, wide = size_m
@@ -305,10 +310,10 @@ def _fits_lane(
     steps = [frame.at(u, 0.0) for u in np.linspace(-long / 2, long / 2, math.ceil(long / wide) + 1).tolist()]
     if not all(site.is_free(*at, wide / 2 + 0.3) for at in steps):
         return False
-    return all(outline.distance(other) > (clear_m if asked else 0.5) for other, asked in taken)
+    return all(outline.distance(other) > (clear_m if is_target else 0.5) for other, is_target in occupied)
 
 
-def _taken(site: Site) -> list[tuple[Polygon, bool]]:
+def _occupied(site: Site) -> list[tuple[Polygon, bool]]:
     """Boxes of the catalogue's things as they stand, moved ones too, and whether a task may ask for each."""
-    known = set(site.catalogue.targets)
-    return [(_box_of(i), i.category in known) for i in site.instances if i.category in site.catalogue]
+    targets = set(site.catalogue.targets)
+    return [(_box_of(i), i.category in targets) for i in site.instances if i.category in site.catalogue]

@@ -343,11 +343,11 @@ def _piers(site: Site, deck: Deck, axis: LineString, below: BaseGeometry) -> lis
     cut = [axis.interpolate(s).distance(site.extent.exterior) < 1.0 for s in (low, high)]
     spots = [low + _END_M] * cut[0] + spots + [high - _END_M] * cut[1]
     streets = below.buffer(_FROM_ROADS_M)
-    out, taken = [], -1e9
+    out, last = [], -1e9
     for spot in spots:
         for shift in (0.0, *(sign * d for d in np.arange(1.0, _SHIFT_M + 0.1) for sign in (1.0, -1.0))):
             s = spot + shift
-            if not (max(low, taken) + _END_M <= s <= high - _END_M):
+            if not (max(low, last) + _END_M <= s <= high - _END_M):
                 continue
             plan = _slice(deck.span, axis, s - _PIER_M / 2, s + _PIER_M / 2, 100.0)
             plan = plan.buffer(-0.15, join_style="mitre")
@@ -358,7 +358,7 @@ def _piers(site: Site, deck: Deck, axis: LineString, below: BaseGeometry) -> lis
             top = float(deck.heights.z(x, y).min()) - deck.bridge.depth_m / 2
             out += [slab(piece, foot, top) for piece in polygons_of(plan)]
             site.occupy(plan.buffer(0.1))
-            taken = s
+            last = s
             break
     return out
 

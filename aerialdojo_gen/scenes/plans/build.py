@@ -33,14 +33,6 @@ from aerialdojo_gen.scenes.terrain import flat_terrain
 from aerialdojo_gen.scenes.vocabulary import SHAPES, part_mesh
 
 
-def prop_height(site: Site, category: str, variant: str | None, x: float, y: float) -> float:
-    """Height of a thing that stands at z = 0, metres, in the variant that it would have."""
-    chosen = variant if variant is not None else site.next_variant(category)
-    return float(
-        site.catalogue.instantiate(category, "trial", site.rng_for("trial"), (x, y, 0.0), 0.0, chosen).bounds[1, 2]
-    )
-
-
 def poses_of(site: Site, pattern: Pattern) -> Iterator[Pose]:
     """Yield the poses of a pattern."""
     if pattern.along is not None:
@@ -96,11 +88,11 @@ def build_site(
 
 def _check_inventory(scene: Scene, site: Site, where: str) -> None:
     """Raise an `AssetError` if a scene has fewer instances of a category than its plan asks for."""
-    found, inventory = Counter(instance.category for instance in scene.instances), site.head.inventory
+    there, inventory = Counter(instance.category for instance in scene.instances), site.head.inventory
     for category in inventory:
-        if category not in site.catalogue and not found[category]:
+        if category not in site.catalogue and not there[category]:
             raise AssetError(f"{where}: inventory: unknown category {category!r}{nearest(category, site.catalogue)}")
-    short = [f"{c} (needs {n}, has {found[c]})" for c, n in inventory.items() if found[c] < n]
+    short = [f"{c} (needs {n}, has {there[c]})" for c, n in inventory.items() if there[c] < n]
     if short:
         raise AssetError(f"{where}: inventory: the scene has too few of {', '.join(short)}")
 
@@ -173,13 +165,15 @@ class _Building:
     def _call(self, kind: str, body: Mapping[str, Any], where: str, *fixed: Any) -> Any:
         """Call the builder that ``make`` names with the other keys of a table."""
         name = body["make"]
-        known = {name: one for name, one in kit().items() if one.kind == kind}
-        if not isinstance(name, str) or name not in known:
-            raise AssetError(f"{where}: {unknown(f'no {kind} builder', str(name), known)}")
-        found = known[name]
-        arguments = self._read(found.arguments, {k: v for k, v in body.items() if k != "make"}, f"{where} {name!r}")
+        builders = {name: one for name, one in kit().items() if one.kind == kind}
+        if not isinstance(name, str) or name not in builders:
+            raise AssetError(f"{where}: {unknown(f'no {kind} builder', str(name), builders)}")
+        builder = builders[name]
+        arguments = self._read(builder.arguments, {k: v for k, v in body.items() if k != "make"}, f"{where} {name!r}")
         try:
-            return found.function(*fixed, **{key: getattr(arguments, key) for key in found.arguments.model_fields})
+            return builder.function(
+                *fixed, **{key: getattr(arguments, key) for key in builder.arguments.model_fields}
+            )
         except (AssetError, ValueError, ArithmeticError, GEOSException) as error:
             # Numbers that are each within bounds and make no body together.
             raise AssetError(f"{where} {name!r}: {error}") from error
@@ -256,12 +250,12 @@ class _Building:
         entry = self._read(Place, {**self._placing, **body}, where)
         for number, raw in enumerate(entry.place):
             for thing in self._row(raw, f"{where}[{number}]"):
-                self._stand(thing, entry, where)
+                self._place_one(thing, entry, where)
         if entry.pattern is not None:
             placed = 0
             for pose in poses_of(self._site, entry.pattern):
                 what = entry.pattern.of[placed % len(entry.pattern.of)]
-                placed += self._stand(self._thing([what, *pose], where), entry, where)
+                placed += self._place_one(self._thing([what, *pose], where), entry, where)
 
     def _row(self, raw: Any, where: str) -> list[Thing]:
         """Read a thing, or a straight row of them."""
@@ -288,7 +282,7 @@ class _Building:
         pose = frame.pose(*thing.at, thing.yaw_deg) if any(entry.frame) else (*thing.at, thing.yaw_deg)
         return category, variant or None, pose
 
-    def _stand(self, thing: Thing, entry: Place, where: str) -> bool:
+    def _place_one(self, thing: Thing, entry: Place, where: str) -> bool:
         category, variant, (x, y, yaw_deg) = self._pose(thing, entry, where)
         z, above_m = thing.on if thing.on is not None else entry.on, thing.above_ground_m or entry.above_ground_m
         settles = z is None and entry.settle_m is not None and not above_m and entry.sunk is None
@@ -298,14 +292,17 @@ class _Building:
             z = self._site.ground_z(x, y) + above_m
         if entry.sunk is not None:
             share, most_m = entry.sunk
-            height_m = prop_height(self._site, category, variant, x, y)
-            z = (z or 0.0) - min(share * height_m, most_m)
-        given = {key: getattr(thing, key) for key in ("design", "scale", "roles", "params", "attributes")}
-        given = {key: value for key, value in given.items() if value}
+            look = variant if variant is not None else self._site.next_variant(category)
+            trial = self._site.catalogue.instantiate(
+                category, "trial", self._site.rng_for("trial"), (x, y, 0.0), variant=look
+            )
+            z = (z or 0.0) - min(share * float(trial.bounds[1, 2]), most_m)
+        own = {key: getattr(thing, key) for key in ("design", "scale", "roles", "params", "attributes")}
+        own = {key: value for key, value in own.items() if value}
         one = Placement(
             category, x, y, yaw_deg, variant, z, thing.phrase or entry.phrase, thing.node, solid=thing.solid,
             settle_m=entry.settle_m if settles else None, clear_m=entry.clear_m, margin_m=entry.margin_m,
-            room_m=entry.room_m, **given,
+            room_m=entry.room_m, **own,
         )  # fmt: skip
         try:
             placed = self._site.place(one, entry.fit) is not None

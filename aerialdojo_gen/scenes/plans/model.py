@@ -237,7 +237,7 @@ def _within_reach(names: PlanNames, area: BaseGeometry, value: Mapping[str, Any]
     return lambda _site: lambda x, y: max(0.0, 1.0 - float(shapely.distance(area, shapely.Point(x, y))) / reach_m)
 
 
-def _beside(names: PlanNames, value: Mapping[str, Any]) -> SiteFunction:
+def _next_to(names: PlanNames, value: Mapping[str, Any]) -> SiteFunction:
     lines = value["beside"] if isinstance(value["beside"], list) else [value["beside"]]
     return _within_reach(names, shapely.union_all([LineString(names.line(line)) for line in lines]), value)
 
@@ -258,7 +258,7 @@ def _of_ground(names: PlanNames, value: Any, function: Callable[[Site, float, fl
 _KINDS: dict[str, Callable[[PlanNames, Mapping[str, Any]], SiteFunction]] = {
     "patches": _patches,
     "near": lambda names, value: _within_reach(names, names.area(value["near"]), value),
-    "beside": _beside,
+    "beside": _next_to,
     "inside": _inside,
     "gentle": lambda names, value: _of_ground(names, value["gentle"], _gentle),
     "above": lambda names, value: _of_ground(

@@ -48,20 +48,20 @@ def schema_text() -> str:
 
 
 def _schema(model: type[BaseModel], definitions: dict[str, Any]) -> dict[str, Any]:
-    found = model.model_json_schema(mode="validation")
-    for name, one in found.pop("$defs", {}).items():
+    schema = model.model_json_schema(mode="validation")
+    for name, one in schema.pop("$defs", {}).items():
         if definitions.setdefault(name, one) != one:
             raise ValueError(f"two classes of the kit's arguments are called {name}: rename one")
-    return found
+    return schema
 
 
 def _builder(name: str, definitions: dict[str, Any]) -> dict[str, Any]:
     one = kit()[name]
-    found = _schema(one.arguments, definitions)
-    keys = {"make": {"const": name}, **found.get("properties", {})}
+    schema = _schema(one.arguments, definitions)
+    keys = {"make": {"const": name}, **schema.get("properties", {})}
     if one.kind == "site":
         keys["as"] = {"type": ["string", "array"], "items": {"type": "string"}}
     return {
         "type": "object", "title": name, "description": one.summary, "properties": keys,
-        "required": ["make", *found.get("required", [])], "additionalProperties": False,
+        "required": ["make", *schema.get("required", [])], "additionalProperties": False,
     }  # fmt: skip
