@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from support.extended import without_columns
+from support.planting import without_columns
 from support.walled import VIEWPOINTS, walled, write_walled
 
 from aerialdojo_gen.base.errors import StoreError, UsageError

@@ -11,7 +11,6 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from support import task_files
-from support.authors_files import document, put
 from support.command_line import called
 
 from aerialdojo_gen.base.errors import ImportRefused, UsageError
@@ -226,7 +225,7 @@ def test_the_command_reports(tmp_path):
 
 @pytest.mark.parametrize("split", ["IID_TRAINS", "ID_TRAINS"])
 def test_a_file_of_theirs_is_read_with_what_it_lacks(tmp_path, split):
-    put(tmp_path / "root", *document(turn_deg=15), split)
+    task_files.put_authors(tmp_path / "root", *task_files.authors(turn_deg=15), split)
     report = import_benchmark("aerialdojo", [tmp_path / "root"], tmp_path)
     task = pd.read_parquet(tmp_path / "imported/aerialdojo/tasks").iloc[0]
     route = pd.read_parquet(tmp_path / "imported/aerialdojo/routes").iloc[0]
@@ -248,10 +247,10 @@ def test_a_file_of_theirs_is_read_with_what_it_lacks(tmp_path, split):
 
 
 def test_a_turn_of_another_size_is_none_of_ours_and_the_evaluators_name_of_the_quaternion_is_read(tmp_path):
-    tasks, trajectory = document()
+    tasks, trajectory = task_files.authors()
     pose = tasks[0]["start_pose"]
     pose["start_quaternionr"] = pose.pop("start_quaternion_xyzw")
-    put(tmp_path / "root", tasks, trajectory)
+    task_files.put_authors(tmp_path / "root", tasks, trajectory)
     report = import_benchmark("aerialdojo", [tmp_path / "root"], tmp_path)
     route = pd.read_parquet(tmp_path / "imported/aerialdojo/routes").iloc[0]
     assert route["action"] is None
@@ -260,7 +259,7 @@ def test_a_turn_of_another_size_is_none_of_ours_and_the_evaluators_name_of_the_q
 
 
 def test_a_task_file_out_of_its_tree_has_tasks_without_routes(tmp_path):
-    path = put(tmp_path / "root", *document())
+    path = task_files.put_authors(tmp_path / "root", *task_files.authors())
     (tmp_path / "a").mkdir()
     (tmp_path / "b").mkdir()
     names = []
@@ -278,7 +277,7 @@ def test_a_task_file_out_of_its_tree_has_tasks_without_routes(tmp_path):
 
 @pytest.mark.parametrize("name", ["../outside", "/etc", "a b", ""])
 def test_a_scene_name_is_a_plain_one_wherever_the_file_lies(tmp_path, name):
-    tasks, _ = document()
+    tasks, _ = task_files.authors()
     path = task_files.write(tmp_path / "mine.json", [*tasks, tasks[0] | {"episode_id": "7", "map_name": name}])
     with pytest.raises(ImportRefused, match=r"mine\.json: row 1: map_name: "):
         import_benchmark("aerialdojo", [path], tmp_path)
@@ -287,11 +286,11 @@ def test_a_scene_name_is_a_plain_one_wherever_the_file_lies(tmp_path, name):
 @settings(max_examples=20, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.data())
 def test_whatever_stands_in_a_task_or_its_trajectory_is_read_or_named(tmp_path, data):
-    tasks, trajectory = document()
+    tasks, trajectory = task_files.authors()
     target = data.draw(st.sampled_from([tasks[0], tasks[0]["start_pose"], trajectory, trajectory["trajectory"][1]]))
     target[data.draw(st.sampled_from([*sorted(target), "another"]))] = data.draw(task_files.ANYTHING)
     root = tmp_path / "any"
-    put(root, tasks, trajectory)
+    task_files.put_authors(root, tasks, trajectory)
     report = import_benchmark("aerialdojo", [root], tmp_path, Options(skip_bad=True), force=True)
     kept = pd.read_parquet(tmp_path / "imported/aerialdojo/tasks")
     assert (report.records, len(kept)) == (1, 1 - report.n_bad)
@@ -299,10 +298,10 @@ def test_whatever_stands_in_a_task_or_its_trajectory_is_read_or_named(tmp_path, 
 
 
 def test_tasks_of_one_pair_are_told_apart(tmp_path):
-    tasks, trajectory = document()
+    tasks, trajectory = task_files.authors()
     tasks.append(tasks[0] | {"episode_id": "7"})
     trajectory["task_id"] = "3_0__5"
-    path = put(tmp_path / "root", tasks, trajectory)
+    path = task_files.put_authors(tmp_path / "root", tasks, trajectory)
     folder = tmp_path / "root/TrajectoryDATA" / path.parent.relative_to(tmp_path / "root/SemanticOGS")
     shutil.copy(folder / "42.json", folder / "7.json")
     report = import_benchmark("aerialdojo", [tmp_path / "root"], tmp_path)
