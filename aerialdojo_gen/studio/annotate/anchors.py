@@ -71,7 +71,7 @@ class AnchorService:
 
         key = (entry.id, entry.node)
         if key not in self._candidates:
-            anchors, _ = self._run(
+            anchors, *_ = self._run(
                 lambda: anchors_of(self._item(entry), self._world.result(), self._job, self.config)
             )
             self._candidates[key] = anchors

@@ -28,9 +28,10 @@ from aerialdojo_gen.base.errors import AgentUnavailable, AnnotationError, UsageE
 from aerialdojo_gen.base.safe_parse import read_toml
 from aerialdojo_gen.benchmark.agents.base import InvalidAnswer
 from aerialdojo_gen.benchmark.agents.load import load_agent, read_options
-from aerialdojo_gen.benchmark.evaluation import BudgetTracker, Limits
+from aerialdojo_gen.benchmark.evaluation import Limits
 from aerialdojo_gen.benchmark.llm.agent import LanguageModelAgent, Reply
 from aerialdojo_gen.benchmark.llm.answer import read_as
+from aerialdojo_gen.benchmark.worker import Finished
 from aerialdojo_gen.pipeline.stage import ProjectPaths
 from aerialdojo_gen.scenes.build import build_scene
 from aerialdojo_gen.scenes.catalogue import load_catalogue
@@ -109,7 +110,7 @@ class Rewriter:
         texts: dict[int, str] = {}
         for entry in objects:
             cost = self._agent.options.cost_usd(*done.tokens) or 0.0
-            if failures >= _MAX_FAILURES or BudgetTracker(limits, cost, sum(done.tokens)).spent:
+            if failures >= _MAX_FAILURES or limits.reached(Finished(cost_usd=cost, tokens=sum(done.tokens))):
                 done.left += 1
                 continue
             try:
