@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import re
-from collections.abc import Mapping, Sequence
+import shutil
+import tarfile
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from aerialdojo_gen.base.cli_context import command
 from aerialdojo_gen.base.errors import AssetError, StoreError
 from aerialdojo_gen.base.pictures import REFERENCE_PNG, decode_rgb, encode_png
 from aerialdojo_gen.exchange import aerialdojo_layout as layout
-from aerialdojo_gen.exchange.folder import link_or_copy
+from aerialdojo_gen.exchange.folder import count_routes, link_or_copy
 from aerialdojo_gen.exchange.frames import NED, words_of
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.rendering.backend import choose_renderer, scene_renderer
@@ -26,12 +30,16 @@ from aerialdojo_gen.scenes.stored import mesh_copy
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.files import sha256_of
 from aerialdojo_gen.store.root import DataRoot
-from aerialdojo_gen.store.schemas import DIFFICULTY_COLUMNS, SPLIT_COLUMNS
+from aerialdojo_gen.store.schemas import DIFFICULTY_COLUMNS, SETTINGS, SPLIT_COLUMNS
 
 Row = Mapping[str, Any]
 _PICTURES = "Images"
 # Between two sizes and two renderers edges and shadows' rims differ; another view or object differs by far more.
 _SAME_VIEW = 12.0
+# Bytes of the text of a pose and of a task, measured on the paper's scenes.
+_POSE_BYTES, _TASK_BYTES = 178.0, 2009.0
+# Bytes of a picture grow with this power of its edge.
+_GROWTH, _OWN_PX = 0.8, 320
 _OWN_PICTURES = "--picture-size 0 exports the release's own pictures"
 
 
@@ -116,6 +124,50 @@ LOST: Mapping[str, Sequence[str]] = {
 _ENDS = ["nav_id", "start_object_id", "target_object_id", "goal_x_m", "goal_y_m", "goal_z_m", "length_m",
          "euclidean_m", "detour_ratio"]  # fmt: skip
 _COORDINATES = "ProjectAirSim NED"
+
+
+def scene_size(data: DataRoot, scene: str, picture_px: int) -> tuple[int, float]:
+    """Reckon the files and bytes of a scene's tasks, trajectories and pictures."""
+    files, size = 0, 0.0
+    for subset in ("train", "test"):
+        routes, poses = count_routes(data, scene, subset)
+        size += poses * _POSE_BYTES + routes * _TASK_BYTES
+        tasks = store.read_scene(data, f"tasks/{subset}", scene, ("setting", "reference_image_id"))
+        shown = tasks.filter(pc.is_valid(tasks["reference_image_id"]))
+        pictures = shown.group_by(["setting", "reference_image_id"]).aggregate([]).num_rows
+        files += routes + len(layout.KINDS) * len(SETTINGS) + pictures
+    # Each picture once: those of several settings are links.
+    objects = store.read_scene(data, "release/objects", scene, ("reference_image",))
+    stored = pc.sum(pc.binary_length(objects["reference_image"])).as_py() or 0
+    return files, size + stored * ((picture_px / _OWN_PX) ** _GROWTH if picture_px else 1.0)
+
+
+def begin(
+    data: DataRoot, _scenes: Sequence[str], root: Path, picture_px: int, shards: bool
+) -> Callable[[str], dict[str, int]]:
+    """Return what writes a scene into the folder, as files or as an archive; scenes share nothing."""
+
+    def write(scene: str) -> dict[str, int]:
+        if not shards:
+            return write_scene(data, scene, root, picture_px)
+        counts = write_scene(data, scene, root / scene, picture_px)
+        _pack_tar(root / scene, root / f"{scene}.tar")
+        return counts
+
+    return write
+
+
+def _pack_tar(folder: Path, archive: Path) -> None:
+    """Move a folder's files into a tar archive that depends on names and contents alone; the folder goes."""
+    with tarfile.open(archive, "w", format=tarfile.PAX_FORMAT) as tar:
+        for path in sorted(folder.rglob("*")):
+            entry = tar.gettarinfo(path, path.relative_to(folder).as_posix())
+            entry.uid = entry.gid = entry.mtime = 0
+            entry.uname = entry.gname = ""
+            entry.mode = 0o755 if entry.isdir() else 0o644
+            with path.open("rb") if entry.isreg() else contextlib.nullcontext() as file:
+                tar.addfile(entry, file)
+    shutil.rmtree(folder)
 
 
 def write_scene(data: DataRoot, scene: str, root: Path, picture_px: int = 0) -> dict[str, int]:

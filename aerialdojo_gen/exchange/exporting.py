@@ -2,52 +2,54 @@
 
 from __future__ import annotations
 
-import contextlib
 import shutil
-import tarfile
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 import numpy as np
-import pyarrow.compute as pc
 
 from aerialdojo_gen.base.cli_context import command
 from aerialdojo_gen.base.errors import StoreError, UsageError
 from aerialdojo_gen.base.names import check_known, choose_scenes
 from aerialdojo_gen.dataset.contents import scenes_in_release
-from aerialdojo_gen.exchange import aerialdojo_layout, aerialdojo_writer, habitat_writer, shape_export
+from aerialdojo_gen.exchange import aerialdojo_writer, habitat_writer, shape_export
 from aerialdojo_gen.exchange.folder import MARKER, whole_folder, write_marker
 from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.scenes.stored import read_scene_mesh
-from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.layout import is_plain
 from aerialdojo_gen.store.root import DataRoot, Where, open_root
-from aerialdojo_gen.store.schemas import ACTION_NAMES, SETTINGS, SUBSETS
+from aerialdojo_gen.store.schemas import ACTION_NAMES, SUBSETS
 
-# Bytes of a picture grow with this power of its edge.
-_GROWTH, _OWN_PX = 0.8, 320
 # A file takes whole blocks of a disk.
 _BLOCK = 4096
 
 
 @dataclass(frozen=True)
 class Format:
-    """A format of others."""
+    """A format of others: what its module in this folder does."""
 
     frame: str
     lost: Mapping[str, Sequence[str]]  # Columns that it has no field for, by table
-    pose_bytes: float  # Of its text, measured on the paper's scenes
-    task_bytes: float
+    shared_files: int  # Written once, the marker among them
+    # Files and bytes of a scene, by the edge of its pictures in pixels
+    scene_size: Callable[[DataRoot, str, int], tuple[int, float]]
+    # Writes what scenes share, and returns what writes one; of scenes, folder, edge of pictures, whether as archives
+    begin: Callable[[DataRoot, Sequence[str], Path, int, bool], Callable[[str], dict[str, int]]]
+    actions: Mapping[int, str] | None = None  # Names of its actions, where its files have none
 
 
 FORMATS = {
     "aerialdojo": Format(
-        "north, east, down, metres; quaternions xyzw; forward +x", aerialdojo_writer.LOST, 178.0, 2009.0
+        "north, east, down, metres; quaternions xyzw; forward +x", aerialdojo_writer.LOST, 1,
+        aerialdojo_writer.scene_size, aerialdojo_writer.begin,
     ),
-    "habitat": Format("east, up, south, metres; quaternions xyzw; forward -z", habitat_writer.LOST, 21.5, 0.0),
-}
+    "habitat": Format(
+        "east, up, south, metres; quaternions xyzw; forward -z", habitat_writer.LOST, 1 + len(SUBSETS),
+        habitat_writer.scene_size, habitat_writer.begin, dict(enumerate(ACTION_NAMES)),
+    ),
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -65,27 +67,10 @@ class Size:
 
 def estimate_size(format_name: str, data: DataRoot, scenes: Sequence[str], picture_px: int) -> Size:
     """Reckon what an export of scenes will be."""
-    form, habitat, size = FORMATS[format_name], format_name == "habitat", 0.0
-    files = 1 + len(SUBSETS) if habitat else 1
-    for scene in scenes:
-        for subset in ("train", "test"):
-            routes = store.read_scene(data, f"routes/{subset}", scene, ("nav_id", "n_actions"))
-            # A pose before every action, and the last one.
-            poses = (pc.sum(routes["n_actions"]).as_py() or 0) + routes.num_rows
-            size += poses * form.pose_bytes + routes.num_rows * form.task_bytes
-            if habitat:
-                files += bool(routes.num_rows)
-                continue
-            tasks = store.read_scene(data, f"tasks/{subset}", scene, ("setting", "reference_image_id"))
-            shown = tasks.filter(pc.is_valid(tasks["reference_image_id"]))
-            pictures = shown.group_by(["setting", "reference_image_id"]).aggregate([]).num_rows
-            files += routes.num_rows + len(aerialdojo_layout.KINDS) * len(SETTINGS) + pictures
-        if not habitat:
-            # Each picture once: those of several settings are links.
-            objects = store.read_scene(data, "release/objects", scene, ("reference_image",))
-            stored = pc.sum(pc.binary_length(objects["reference_image"])).as_py() or 0
-            size += stored * ((picture_px / _OWN_PX) ** _GROWTH if picture_px else 1.0)
-    return Size(files, round(size), round(size + files * _BLOCK / 2))
+    form = FORMATS[format_name]
+    sizes = [(form.shared_files, 0.0), *(form.scene_size(data, scene, picture_px) for scene in scenes)]
+    files, size = (sum(column) for column in zip(*sizes, strict=True))
+    return Size(int(files), round(size), round(size + files * _BLOCK / 2))
 
 
 def check_room(target: Path, needed: int) -> None:
@@ -97,19 +82,6 @@ def check_room(target: Path, needed: int) -> None:
             f"{target}: about {needed / 1e6:,.0f} MB are needed, {free / 1e6:,.0f} MB are free: name another disk by "
             "--out, or fewer scenes with --scene"
         )
-
-
-def pack_tar(folder: Path, archive: Path) -> None:
-    """Move a folder's files into a tar archive that depends on names and contents alone; the folder goes."""
-    with tarfile.open(archive, "w", format=tarfile.PAX_FORMAT) as tar:
-        for path in sorted(folder.rglob("*")):
-            entry = tar.gettarinfo(path, path.relative_to(folder).as_posix())
-            entry.uid = entry.gid = entry.mtime = 0
-            entry.uname = entry.gname = ""
-            entry.mode = 0o755 if entry.isdir() else 0o644
-            with path.open("rb") if entry.isreg() else contextlib.nullcontext() as file:
-                tar.addfile(entry, file)
-    shutil.rmtree(folder)
 
 
 PICTURE_PX = 640
@@ -143,30 +115,11 @@ def export_release(
         instead = f", as {len(chosen)} archives" if shards else many
         reporter.line(f"export: {size}{instead}, into {out}")
         check_room(out, size.bytes if shards else size.on_disk)
-        write_scene = _writer_of_scenes(format_name, root, chosen, folder, size_px, shards)
-        counts = _write_scenes(chosen, write_scene, reporter)
-        actions = dict(enumerate(ACTION_NAMES)) if format_name == "habitat" else None
-        write_marker(folder, format_name, form.frame, scenes=chosen, counts=counts, actions=actions, lost=form.lost)
+        counts = _write_scenes(chosen, form.begin(root, chosen, folder, size_px, shards), reporter)
+        write_marker(
+            folder, format_name, form.frame, scenes=chosen, counts=counts, actions=form.actions, lost=form.lost
+        )
     return counts
-
-
-def _writer_of_scenes(
-    format_name: str, root: DataRoot, scenes: Sequence[str], folder: Path, size_px: int, shards: bool
-) -> Callable[[str], dict[str, int]]:
-    """Return what writes a scene into the folder; Habitat's index, which all scenes share, is written at once."""
-    if format_name == "habitat":
-        categories = habitat_writer.categories_of(root, scenes)
-        habitat_writer.write_index(folder, categories)
-        return lambda scene: habitat_writer.write_scene(root, scene, folder, categories)
-
-    def write(scene: str) -> dict[str, int]:
-        if not shards:
-            return aerialdojo_writer.write_scene(root, scene, folder, size_px)
-        counts = aerialdojo_writer.write_scene(root, scene, folder / scene, size_px)
-        pack_tar(folder / scene, folder / f"{scene}.tar")
-        return counts
-
-    return write
 
 
 SHAPES = ("pointcloud", "occupancy")

@@ -12,9 +12,12 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path, PurePosixPath
 from typing import Any
 
+import pyarrow.compute as pc
+
 from aerialdojo_gen.base.errors import Malformed, StoreError, UsageError, disk_error
 from aerialdojo_gen.base.safe_parse import loads_json
 from aerialdojo_gen.base.version import __version__
+from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.atomic import atomic_file, atomic_folder, make_folder
 from aerialdojo_gen.store.root import DataRoot, LocalRoot
 from aerialdojo_gen.store.staging import NO_LOCKS, remove, sweep
@@ -162,3 +165,9 @@ def link_or_copy(source: Path, target: Path) -> None:
     except OSError:
         # No hard links here: a copy.
         shutil.copyfile(source, target)
+
+
+def count_routes(data: DataRoot, scene: str, subset: str) -> tuple[int, int]:
+    """Count a scene's routes in a subset, and their poses: one before every action, and the last one."""
+    actions = store.read_scene(data, f"routes/{subset}", scene, ("n_actions",))["n_actions"]
+    return len(actions), len(actions) + (pc.sum(actions).as_py() or 0)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import gzip
 import json
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -17,11 +17,14 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
+from aerialdojo_gen.exchange.folder import count_routes
 from aerialdojo_gen.exchange.frames import HABITAT, yaw_to_habitat_quaternion_xyzw
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import DataRoot
 from aerialdojo_gen.store.schemas import DIFFICULTY_COLUMNS, SPLIT_COLUMNS, SUBSETS
 
+# Of the compressed text, measured on the paper's scenes.
+_POSE_BYTES = 21.5
 LOST: Mapping[str, Sequence[str]] = {
     "tasks": [
         "modality (one episode a navigation task)", "description", "reference_image_id", "image_distance_m",
@@ -36,18 +39,24 @@ LOST: Mapping[str, Sequence[str]] = {
 }  # fmt: skip
 
 
-def categories_of(data: DataRoot, scenes: Sequence[str]) -> dict[str, int]:
-    """Number the categories of the scenes' objects, by name."""
+def scene_size(data: DataRoot, scene: str, _picture_px: int) -> tuple[int, float]:
+    """Reckon the files and bytes of a scene's episodes."""
+    counts = [count_routes(data, scene, subset) for subset in ("train", "test")]
+    return sum(routes > 0 for routes, _ in counts), sum(poses for _, poses in counts) * _POSE_BYTES
+
+
+def begin(
+    data: DataRoot, scenes: Sequence[str], root: Path, _picture_px: int, _shards: bool
+) -> Callable[[str], dict[str, int]]:
+    """Write each split's own file, which has no episodes but the categories, and return what writes a scene's."""
     columns = (store.read_scene(data, "release/objects", scene, ["category"])["category"] for scene in scenes)
-    return {name: k for k, name in enumerate(sorted({name for column in columns for name in column.to_pylist()}))}
-
-
-def write_index(root: Path, categories: Mapping[str, int]) -> None:
-    """Write each split's own file, which has no episodes but the categories: those lie by scene below ``content``."""
+    names = sorted({name for column in columns for name in column.to_pylist()})
+    categories = {name: k for k, name in enumerate(names)}
     for split in SUBSETS:
         (root / split / "content").mkdir(parents=True)
         with _gzip(root / split / f"{split}.json.gz") as file:
             file.write(json.dumps({**_numbers(categories), "goals_by_category": {}, "episodes": []}).encode())
+    return lambda scene: write_scene(data, scene, root, categories)
 
 
 def write_scene(data: DataRoot, scene: str, root: Path, categories: Mapping[str, int]) -> dict[str, int]:
