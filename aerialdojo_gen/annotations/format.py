@@ -20,7 +20,7 @@ from aerialdojo_gen.base.errors import BeyondBounds, brief
 from aerialdojo_gen.base.explain import faults_of
 from aerialdojo_gen.base.names import unknown
 from aerialdojo_gen.base.safe_parse import JsonPath, find_violation, scan_json
-from aerialdojo_gen.store.atomic import atomic_file
+from aerialdojo_gen.store.atomic import atomic_write
 
 FORMAT = "aerialdojo-annotations"
 VERSION = 1
@@ -254,8 +254,7 @@ def format_annotations(annotations: Annotations) -> str:
 
 def write_annotations(annotations: Annotations, path: Path) -> None:
     """Write an annotation file atomically."""
-    with atomic_file(path.parent, path.name) as temporary:
-        temporary.write_text(format_annotations(annotations), encoding="utf-8")
+    atomic_write(path.parent, path.name, format_annotations(annotations))
 
 
 def _entries(document: Document, key: str, raw: Any, kind: type[_E], faults: list[Fault]) -> dict[int, _E]:

@@ -15,7 +15,7 @@ from aerialdojo_gen.benchmark.registry import NAMES_OF
 from aerialdojo_gen.benchmark.report import page_environment, page_parts
 from aerialdojo_gen.benchmark.scoring import SCORE, ScoreCard, ScoreRow, scored_runs
 from aerialdojo_gen.benchmark.tables import NONE, text
-from aerialdojo_gen.store.atomic import atomic_file, make_folder
+from aerialdojo_gen.store.atomic import atomic_write, make_folder
 from aerialdojo_gen.store.schemas import SETTINGS
 
 _NEAR_M, _FAR_M = (PROFILES[name].radius_m for name in DEFAULT_PROFILES)
@@ -75,8 +75,7 @@ def write_leaderboard(folder: Path, page: Path) -> int:
         **page_parts(["report.css", "leaderboard.css"], "leaderboard.js"),
     )
     make_folder(page.parent)
-    with atomic_file(page.parent, page.name) as temporary:
-        temporary.write_text(html, encoding="utf-8")
+    atomic_write(page.parent, page.name, html)
     return len(cards)
 
 

@@ -22,7 +22,7 @@ from aerialdojo_gen.benchmark.registry import in_setting, named_tables
 from aerialdojo_gen.benchmark.replay import Replay
 from aerialdojo_gen.benchmark.runs import Run
 from aerialdojo_gen.benchmark.tables import ReportRequest, as_csv, as_json
-from aerialdojo_gen.store.atomic import atomic_file
+from aerialdojo_gen.store.atomic import atomic_write
 
 # Long tables, folded away on the page.
 _FOLDED = ("type", "scene")
@@ -50,8 +50,7 @@ def write_report(out: Path, request: ReportRequest, replays: Sequence[Replay]) -
         **{f"{name}.{kind}": data for (name, kind), data in figures.items()},
     }
     for name, data in files.items():
-        with atomic_file(out, name) as temporary:
-            temporary.write_bytes(data)
+        atomic_write(out, name, data)
     return [out / name for name in files]
 
 

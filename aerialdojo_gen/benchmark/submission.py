@@ -30,7 +30,7 @@ from aerialdojo_gen.benchmark.episodes import read_run
 from aerialdojo_gen.benchmark.metrics import METRICS, PROFILES, episodes_of, summarize
 from aerialdojo_gen.benchmark.tasks import Selection, mesh_of, select
 from aerialdojo_gen.store import shards as store
-from aerialdojo_gen.store.atomic import atomic_file
+from aerialdojo_gen.store.atomic import atomic_write
 from aerialdojo_gen.store.root import DataRoot, Where, open_root
 
 _DIGITS = 6  # of metres and radians: a micrometre
@@ -196,8 +196,7 @@ def write_submission(data: Where, log: Where, run: str, file: Path) -> int:
     packed = gzip.compress(text.encode(), 9, mtime=0)
     if len(text) > MAX_JSON_BYTES:
         raise UsageError(f"run {run!r} is too long for one submission: narrow --split or --setting")
-    with atomic_file(file.parent, file.name) as temporary:
-        temporary.write_bytes(packed)
+    atomic_write(file.parent, file.name, packed)
     return len(packed)
 
 

@@ -14,7 +14,7 @@ from aerialdojo_gen.base.text_table import facts, terminal_width
 from aerialdojo_gen.cli import options
 from aerialdojo_gen.cli.common import json_text, merge_scenes, print_json
 from aerialdojo_gen.dataset.build import open_pipeline
-from aerialdojo_gen.store.atomic import atomic_file
+from aerialdojo_gen.store.atomic import atomic_write
 from aerialdojo_gen.store.root import DataRoot, open_root
 
 if TYPE_CHECKING:
@@ -78,8 +78,7 @@ def stats(
         compared = _compared(root, names)
         for path, text in ((markdown, as_markdown(compared)), (csv, as_csv(compared))):
             if path:
-                with atomic_file(path.parent, path.name) as temporary:
-                    temporary.write_text(text, encoding="utf-8")
+                atomic_write(path.parent, path.name, text)
     if figures:
         from aerialdojo_gen.dataset.provenance import made_of_scenes
         from aerialdojo_gen.dataset.stats.figures import draw_figures

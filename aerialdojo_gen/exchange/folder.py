@@ -18,7 +18,7 @@ from aerialdojo_gen.base.errors import Malformed, StoreError, UsageError, disk_e
 from aerialdojo_gen.base.safe_parse import loads_json
 from aerialdojo_gen.base.version import __version__
 from aerialdojo_gen.store import shards as store
-from aerialdojo_gen.store.atomic import atomic_file, atomic_folder, make_folder
+from aerialdojo_gen.store.atomic import atomic_folder, atomic_write, make_folder
 from aerialdojo_gen.store.root import DataRoot, LocalRoot
 from aerialdojo_gen.store.staging import NO_LOCKS, remove, sweep
 
@@ -145,8 +145,7 @@ class PartialExport:
             same = loads_json((self.folder / _REQUEST).read_text(encoding="utf-8")) == self._request
         if not same:
             remove(parts)
-            with atomic_file(self.folder, _REQUEST) as temporary:
-                temporary.write_text(json.dumps(self._request, sort_keys=True), encoding="utf-8")
+            atomic_write(self.folder, _REQUEST, json.dumps(self._request, sort_keys=True))
         make_folder(parts)
         self.resumed = same and any(parts.iterdir())
 

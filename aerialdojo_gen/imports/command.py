@@ -31,7 +31,7 @@ from aerialdojo_gen.imports.naming import Naming
 from aerialdojo_gen.imports.project import PIPELINE, make_project
 from aerialdojo_gen.scenes.glb import write_glb
 from aerialdojo_gen.scenes.model import Scene
-from aerialdojo_gen.store.atomic import atomic_file
+from aerialdojo_gen.store.atomic import atomic_file, atomic_write
 from aerialdojo_gen.store.layout import check_scene_name
 
 
@@ -163,11 +163,9 @@ def _write_scene(scene: Scene, repairs: Repairs, project: Path, recipe: str, tex
     make_project(project)
     with atomic_file(project, f"scenes/{name}.glb") as path:
         write_glb(scene, path)
-    with atomic_file(project, f"scenes/{name}.toml") as path:
-        path.write_text(recipe, encoding="utf-8")
+    atomic_write(project, f"scenes/{name}.toml", recipe)
     if text is not None:
-        with atomic_file(project, f"annotations/{name}.json") as path:
-            path.write_text(text, encoding="utf-8")
+        atomic_write(project, f"annotations/{name}.json", text)
     return AddedScene(scene, repairs, project / PIPELINE, project / "annotations" / f"{name}.json")
 
 

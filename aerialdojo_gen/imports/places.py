@@ -24,7 +24,7 @@ from aerialdojo_gen.scenes.plans import HEIGHTS_SUFFIX
 from aerialdojo_gen.scenes.plans.build import build_plan, build_site
 from aerialdojo_gen.scenes.plans.text import plan_text
 from aerialdojo_gen.scenes.site import MAX_NODES
-from aerialdojo_gen.store.atomic import atomic_file
+from aerialdojo_gen.store.atomic import atomic_write
 
 # Margin around the box: streets continue, and building parts may lie outside.
 _MARGIN_DEG = 0.0006
@@ -112,8 +112,7 @@ def _write_place(name: str, place: PlacePlan, project: Path, notes: tuple[str, .
     heights = f"scenes/{name}{HEIGHTS_SUFFIX}"
     files = {} if table is None else {heights: table.text()}
     for file, content in (files | {f"scenes/{name}.toml": text}).items():
-        with atomic_file(project, file) as path:
-            path.write_text(content, encoding="utf-8")
+        atomic_write(project, file, content)
     for left in {f"scenes/{name}.glb", heights} - files.keys():
         (project / left).unlink(missing_ok=True)
     return AddedPlace(name, scene, project / "scenes" / f"{name}.toml", project / PIPELINE, notes)

@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 
 from aerialdojo_gen.pipeline.registry import STAGES
-from aerialdojo_gen.store.atomic import atomic_file, make_folder
+from aerialdojo_gen.store.atomic import atomic_write, make_folder
 
 PIPELINE = "pipeline.toml"
 _PIPELINE = """\
@@ -28,5 +28,4 @@ def make_project(project: Path) -> None:
         return
     name = "".join(c if c.isalnum() or c in "._-" else "-" for c in project.resolve().name).strip("._-") or "scenes"
     stages = json.dumps([stage.name for stage in STAGES if stage.name != "render"])
-    with atomic_file(project, PIPELINE) as path:
-        path.write_text(_PIPELINE.format(name=name, stages=stages), encoding="utf-8")
+    atomic_write(project, PIPELINE, _PIPELINE.format(name=name, stages=stages))

@@ -29,7 +29,7 @@ from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.worlds.kinds import type_names
 from aerialdojo_gen.scenes.worlds.make import make_world
 from aerialdojo_gen.scenes.worlds.world import MAX_SEED, World
-from aerialdojo_gen.store.atomic import atomic_file
+from aerialdojo_gen.store.atomic import atomic_file, atomic_write
 from aerialdojo_gen.store.root import open_root
 
 DATA = "data"
@@ -123,8 +123,7 @@ def _write_world(work: _Work) -> VariedWorld:
     # Digest the code now, as loaded: edits while the world is made make its mesh stale.
     stage_code(_BUILD.name)
     made = make_world(world, home() / "scene_assets", _catalogue())
-    with atomic_file(project, f"scenes/{world.name}.toml") as path:
-        path.write_text(made.text, encoding="utf-8")
+    atomic_write(project, f"scenes/{world.name}.toml", made.text)
     pipeline = _pipeline(project / PIPELINE)
     folders = (home() / "scene_assets", project / "scenes", project / "annotations")
     paths = ProjectPaths(open_root(project / DATA), *folders)

@@ -35,7 +35,7 @@ from aerialdojo_gen.learning.trajectories import sample_evenly
 from aerialdojo_gen.learning.words import Vocabulary, name_vocabulary
 from aerialdojo_gen.pipeline.executors.base import make_executor
 from aerialdojo_gen.pipeline.progress import Rate, Reporter, duration
-from aerialdojo_gen.store.atomic import atomic_file, make_folder
+from aerialdojo_gen.store.atomic import atomic_file, atomic_write, make_folder
 from aerialdojo_gen.store.files import file_digest
 from aerialdojo_gen.store.root import DataRoot, LocalRoot, Where, open_root
 
@@ -307,8 +307,7 @@ class _Training:
         p, file = self._learner.progress, self._folder / _HISTORY
         if file.is_file():
             rows = [row for row in _rows(file) if (row["phase"], row["epoch"]) < (p.phase, p.epoch)]
-            with atomic_file(self._folder, _HISTORY) as temporary:
-                temporary.write_text("".join(json.dumps(row) + "\n" for row in rows), encoding="utf-8")
+            atomic_write(self._folder, _HISTORY, "".join(json.dumps(row) + "\n" for row in rows))
 
     def _check_settings(self) -> None:
         """Write the training's settings; UsageError if the folder was begun with others."""
@@ -327,8 +326,7 @@ class _Training:
                         f"{self._folder} was begun with another {name}: its fingerprint is {old[:16]}, and that of "
                         f"this one is {value[:16]}; give --restart, or another --out"
                     )
-        with atomic_file(self._folder, _SETTINGS) as temporary:
-            temporary.write_text(json.dumps(own, indent=2) + "\n", encoding="utf-8")
+        atomic_write(self._folder, _SETTINGS, json.dumps(own, indent=2) + "\n")
 
 
 def _rows(file: Path) -> Iterator[dict[str, Any]]:

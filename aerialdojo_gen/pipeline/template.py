@@ -17,7 +17,7 @@ from aerialdojo_gen.base.errors import ConfigError, UsageError
 from aerialdojo_gen.base.explain import explain
 from aerialdojo_gen.base.shipped import written_path
 from aerialdojo_gen.base.text_table import wrapped
-from aerialdojo_gen.store.atomic import atomic_file
+from aerialdojo_gen.store.atomic import atomic_write
 
 _WIDTH = 100
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
@@ -65,8 +65,7 @@ def init_config(path: str | Path, pipeline: str | Path | Pipeline | None = None,
     except ValidationError as error:
         raise ConfigError("; ".join(f"{path}: {line}" for line in explain(error, Pipeline))) from None
     folder = path.absolute().parent
-    with atomic_file(folder, path.name) as temporary:
-        temporary.write_text(pipeline_text(named, folder), encoding="utf-8")
+    atomic_write(folder, path.name, pipeline_text(named, folder))
     return path
 
 

@@ -31,7 +31,7 @@ from aerialdojo_gen.scenes.mesh import to_part
 from aerialdojo_gen.scenes.model import Instance, Scene
 from aerialdojo_gen.scenes.plans.build import build_tables
 from aerialdojo_gen.scenes.shapes import extrude
-from aerialdojo_gen.store.atomic import atomic_file
+from aerialdojo_gen.store.atomic import atomic_write
 
 Image = NDArray[np.uint8]
 
@@ -185,8 +185,7 @@ def write_picture(image: Image, folder: Path, name: str, max_width: int | None =
         image = np.asarray(cv2.resize(image, (max_width, height), interpolation=cv2.INTER_AREA), dtype=np.uint8)
     as_png = Path(name).suffix == ".png"
     data = encode_png(image, SMALLEST_PNG) if as_png else encode_jpeg(image, GALLERY_JPEG)
-    with atomic_file(folder, name) as path:
-        path.write_bytes(data)
+    atomic_write(folder, name, data)
     return folder / name
 
 

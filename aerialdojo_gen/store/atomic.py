@@ -34,6 +34,12 @@ def atomic_file(data: Path, relative: str) -> Iterator[Path]:
         yield temporary
 
 
+def atomic_write(data: Path, relative: str, content: str | bytes) -> None:
+    """Write text, in UTF-8, or bytes as a file under a folder: whole or not at all."""
+    with atomic_file(data, relative) as temporary:
+        temporary.write_bytes(content.encode() if isinstance(content, str) else content)
+
+
 @contextlib.contextmanager
 def atomic_folder(path: Path, root: Path | None = None) -> Iterator[Path]:
     """Fill a folder: whole or not at all; one that is there stays until the new one is whole."""

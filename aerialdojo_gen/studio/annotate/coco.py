@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from aerialdojo_gen.annotations.format import Object
-from aerialdojo_gen.store.atomic import atomic_file
+from aerialdojo_gen.store.atomic import atomic_write
 
 if TYPE_CHECKING:
     from aerialdojo_gen.studio.annotate.session import AnnotationSession
@@ -37,8 +37,7 @@ def write_coco(session: AnnotationSession, path: Path) -> Path:
     """Write `coco_zip` to a file atomically."""
     content = coco_zip(session)
     session.anchors.close()
-    with atomic_file(path.parent, path.name) as temporary:
-        temporary.write_bytes(content)
+    atomic_write(path.parent, path.name, content)
     return path
 
 

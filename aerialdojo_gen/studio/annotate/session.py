@@ -30,7 +30,7 @@ from aerialdojo_gen.scenes.build import cut_out
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.scenes.recipe import Cut, load_imported
-from aerialdojo_gen.store.atomic import atomic_file
+from aerialdojo_gen.store.atomic import atomic_write
 from aerialdojo_gen.store.staging import scratch_folder
 from aerialdojo_gen.studio.annotate.anchors import AnchorService
 from aerialdojo_gen.studio.annotate.document import (
@@ -275,8 +275,7 @@ def _staged(roots: ProjectPaths, scene: str, text: str) -> Iterator[ProjectPaths
 
 
 def _write(recipe: Path, text: str) -> None:
-    with atomic_file(recipe.parent, recipe.name) as path:
-        path.write_text(text, encoding="utf-8")
+    atomic_write(recipe.parent, recipe.name, text)
 
 
 class Describer:

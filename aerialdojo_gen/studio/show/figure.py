@@ -18,7 +18,7 @@ from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.base.pictures import PAGE_JPEG, Picture, encode_jpeg, encode_png
 from aerialdojo_gen.base.terminal import shown_in_page
 from aerialdojo_gen.store import schemas
-from aerialdojo_gen.store.atomic import atomic_file
+from aerialdojo_gen.store.atomic import atomic_file, atomic_write
 from aerialdojo_gen.studio.show import charts
 from aerialdojo_gen.studio.show.pictured import PicturedTask
 
@@ -61,8 +61,7 @@ def _to_data_url(
 
 def write_page(task: PicturedTask, path: Path) -> Path:
     """Write the page of a task atomically."""
-    with atomic_file(path.parent, path.name) as temporary:
-        temporary.write_text(render_page(task), encoding="utf-8")
+    atomic_write(path.parent, path.name, render_page(task))
     return path
 
 
