@@ -183,9 +183,9 @@ def push_to_hub(
     root = open_root(data)
     if not isinstance(root, LocalRoot):
         raise UsageError("push-to-hub sends a folder of this machine: copy the release here and name it with --data")
+    hub = Hub(repo, "push-to-hub", revision, writes=True)
     scenes = check_release(root)
     reporter = reporter or Reporter(quiet=True)
-    hub = Hub(repo, "push-to-hub", revision, writes=True)
     from huggingface_hub import CommitOperationAdd, CommitOperationDelete
 
     own = [*_COMPANIONS, *(part_name(key, scene, "") for key in SHARDS for scene in scenes)]
