@@ -70,6 +70,8 @@ def decode(raw: bytes) -> ShardInfo:
         raise ValueError("its footer is no JSON") from None
     if not isinstance(fields, dict):
         raise ValueError("its footer is no JSON object")
+    if "checksum" not in fields:
+        raise ValueError("its footer has no checksum, as version 0.1 wrote it")
     if fields.keys() != _KEYS or fields.pop("checksum") != _checksum(fields):
         raise ValueError("its footer's checksum is wrong")
     # A right checksum says only that some program wrote it.
