@@ -66,8 +66,6 @@ class Frame:
 
 FRAMES = {name: Frame(name) for name in ("enu", "nwu", "ned", "esd")}
 NED = FRAMES["ned"]
-
-
 HABITAT = Frame("eus")  # Its y axis is the vertical one
 
 

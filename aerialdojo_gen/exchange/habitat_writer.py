@@ -126,7 +126,10 @@ def _episodes(routes: pa.Table, mesh: str, category_of: Mapping[int, str]) -> It
         for row in batch.to_pylist():
             positions = HABITAT.positions_from_world(np.column_stack([row["x_m"], row["y_m"], row["z_m"]])).tolist()
             rotations = yaw_to_habitat_quaternion_xyzw(row["yaw_rad"]).tolist()
-            points = zip(positions, rotations, row["action"], strict=True)
+            points = [
+                {"position": position, "rotation": rotation, "action": action}
+                for position, rotation, action in zip(positions, rotations, row["action"], strict=True)
+            ]
             yield {
                 "scene_id": mesh,
                 "scene_dataset_config": "default",
@@ -141,6 +144,6 @@ def _episodes(routes: pa.Table, mesh: str, category_of: Mapping[int, str]) -> It
                     "setting": row["setting"],
                 },
                 "goals": [],
-                "shortest_paths": [[dict(zip(("position", "rotation", "action"), of, strict=True)) for of in points]],
+                "shortest_paths": [points],
                 "object_category": category_of[row["target_object_id"]],
             }

@@ -164,14 +164,15 @@ def _request(format_name: str, root: DataRoot, options: ExportOptions, parts: li
         "trajectories": [part.index.digest for part in parts],
         "meshes": {} if options.source == "recordings" else {name: mesh_of(root, name)[1] for name in scenes},
         "goals": {name: root.digest(part_name("release/objects", name)) for name in scenes} if shown else {},
-        "recordings": {
-            name: sorted(store.read_stored(root, "recordings", name, ("sha256",))["sha256"].to_pylist())
-            if root.list("recordings", f"{name}/*.parquet")
-            else []
-            for name in (scenes if read else ())
-        },
+        "recordings": {name: _recordings(root, name) for name in scenes} if read else {},
     }
 
 
 def _requested(options: ExportOptions) -> Any:
     return json.loads(json.dumps(dataclasses.asdict(options)))
+
+
+def _recordings(root: DataRoot, scene: str) -> list[str]:
+    if not root.list("recordings", f"{scene}/*.parquet"):
+        return []
+    return sorted(store.read_stored(root, "recordings", scene, ("sha256",))["sha256"].to_pylist())

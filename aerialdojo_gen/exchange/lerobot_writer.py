@@ -216,9 +216,8 @@ def write_part(root: DataRoot, part: Part, options: ExportOptions, folder: Path)
 
 
 def _no_counts(options: ExportOptions) -> Counts:
-    shapes, kinds = {"rgb": (3, 256), "depth": (1, DEPTH_CODES)}, video_kinds(options)
-    keys = [key for view in options.sensors.views for key in (VIEW.format(view), DEPTH.format(view))]
-    return {key: np.zeros(shapes[kinds[key]], np.int64) for key in (*keys, GOAL) if key in kinds}
+    shapes = {"rgb": (3, 256), "depth": (1, DEPTH_CODES)}
+    return {key: np.zeros(shapes[kind], np.int64) for key, kind in video_kinds(options).items()}
 
 
 def _columns(part: Part, k: int) -> dict[str, NDArray[Any]]:

@@ -90,7 +90,7 @@ class FlownEpisode:
         self.reckoning = DeadReckoning()
         # What the teacher would do from here on; empty where that is not known.
         self.route = np.zeros(0, np.int8)
-        # By name of an array of `Steps`.
+        # Of every step, what arrays of `Steps` will hold, by their names.
         self.steps: list[dict[str, Any]] = []
 
     @property
@@ -220,10 +220,8 @@ _MEMORY_MB = 1500
 
 def parts_of(common: Part, index: Index, seed: int) -> list[Part]:
     """Split trajectories into parts, each in a folder of the common one, named by all that its content depends on."""
-    # References do not depend on the network that flies later.
     flown = common.dagger_round
-    facts = [*_facts(common, *(["collect"] if flown else [])),
-             flown and [flown.sha256, flown.seed, flown.round, flown.teacher_share]]  # fmt: skip
+    facts = [*_facts(common), flown and [flown.sha256, flown.seed, flown.round, flown.teacher_share]]
     parts = []
     for number, scene in enumerate(index.scenes):
         rows = np.flatnonzero(index.scene == number)
@@ -254,9 +252,12 @@ def view_parts(common: Part, scenes: Sequence[str], looks: int, seed: int, targe
     return parts
 
 
-def _facts(common: Part, *modules: str) -> list[Any]:
-    s, names = common.sensors, ("rendering.gl", *(f"learning.{name}" for name in ("parts", *modules)))
-    code = [code_of(f"aerialdojo_gen.{name}").digest for name in names]
+def _facts(common: Part) -> list[Any]:
+    s, modules = common.sensors, ["rendering.gl", "learning.parts"]
+    # References do not depend on the network that flies later.
+    if common.dagger_round:
+        modules.append("learning.collect")
+    code = [code_of(f"aerialdojo_gen.{name}").digest for name in modules]
     return [s.views, s.width, s.height, s.fov_deg, s.max_depth_m, common.renderer, code]
 
 

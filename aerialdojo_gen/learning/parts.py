@@ -174,7 +174,7 @@ def collect_views(part: Part, exploration: Exploration) -> Steps:
         rows = trajectory == k
         poses[rows] = index.poses_of(int(k))[at[rows] - index.first[k]]
     poses[:, 3] = draw.uniform(-np.pi, np.pi, exploration.looks)
-    # Up to the first obstacle.
+    # Aside at random, up to the first obstacle.
     aside, space = draw.normal(size=(exploration.looks, 3)), part.space
     aside *= (draw.uniform(0.0, _MAX_OFFSET_M, exploration.looks) / np.linalg.norm(aside, axis=1))[:, None]
     for pose, there in zip(poses, (poses[:, :3] + aside).tolist(), strict=True):

@@ -81,7 +81,7 @@ class CachedFrames:
 
     @cached_property
     def _folder(self) -> Path:
-        code = [code_of(f"aerialdojo_gen.rendering.{name}").digest for name in ("bodies", "gl", "world", "reader")]
+        code = [code_of(f"aerialdojo_gen.rendering.{name}").digest for name in ("gl", "world", "reader")]
         # In the process that reads: to find out which renderer works here is to draw.
         facts = [code, self._kind, renderer_name(self._renderer), asdict(self._sensors)]
         folder = self._base / hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()[:16]

@@ -247,8 +247,8 @@ class Trajectories:
             out["tokens"] = np.stack([self.vocabulary.encode(self._texts[k]) for k in rows])
         if "image" in self.goal:
             ids = [self.index.goal_columns["reference_image_id"][k] for k in rows]
-            images = [i and reference_image(*self.index.sources[k], i) for k, i in zip(rows, ids, strict=True)]
-            out["image"] = np.stack([self._no_image if image is None else image for image in images])
+            sources = zip(ids, (self.index.sources[k] for k in rows), strict=True)
+            out["image"] = np.stack([self._no_image if i is None else reference_image(*of, i) for i, of in sources])
             out["has_image"] = np.array([i is not None for i in ids])
         return out
 

@@ -206,10 +206,11 @@ class Flattened(gymnasium.ObservationWrapper[dict[str, Any], np.int64, dict[str,
         tokens = spaces.Box(0, len(self.vocabulary) - 1, (self.vocabulary.length,), np.int64)
         refused = spaces.Box(0, 1, (1,), np.int32)
         flat = {"tokens": tokens, "remaining_actions": seen["remaining_actions"], "refused": refused}
-        for name in _JOIN.keys() & seen.spaces.keys():
-            views: list[Any] = list(seen[name].spaces.values())  # type: ignore[attr-defined]
-            low, high = (_JOIN[name]([getattr(view, end) for view in views], axis=-1) for end in ("low", "high"))
-            flat[name] = spaces.Box(low, high, dtype=views[0].dtype)
+        for name, join in _JOIN.items():
+            if name in seen.spaces:
+                views: list[Any] = list(seen[name].spaces.values())  # type: ignore[attr-defined]
+                low, high = (join([getattr(view, end) for view in views], axis=-1) for end in ("low", "high"))
+                flat[name] = spaces.Box(low, high, dtype=views[0].dtype)
         self.observation_space = spaces.Dict(flat)
 
     def observation(self, observation: dict[str, Any]) -> dict[str, Any]:
@@ -221,6 +222,7 @@ class Flattened(gymnasium.ObservationWrapper[dict[str, Any], np.int64, dict[str,
             "remaining_actions": observation["remaining_actions"],
             "refused": np.array([observation["refused"]], np.int32),
         }
-        for name in _JOIN.keys() & observation.keys():
-            flat[name] = _JOIN[name](list(observation[name].values()), axis=-1)
+        for name, join in _JOIN.items():
+            if name in observation:
+                flat[name] = join(list(observation[name].values()), axis=-1)
         return flat

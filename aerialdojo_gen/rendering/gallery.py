@@ -223,7 +223,7 @@ def _write_cell(cell: Image, row: Mapping[str, Any]) -> None:
         cv2.putText(cell, line, at, cv2.FONT_HERSHEY_SIMPLEX, 0.34, ink, 1, cv2.LINE_AA)
 
 
-SETTINGS = 3
+_KIT_SETTINGS = 3
 _KIT_WIDTH, _KIT_HEIGHT = 272, 204
 # By these a number of a builder's first use is varied.
 _SCALES = (1.5, 0.6)
@@ -262,10 +262,10 @@ def kit_sheets(catalogue: Catalogue, plans: Sequence[Path]) -> Iterator[tuple[st
         pictures, labels = [], []
         for name in names:
             shown = list(_pictures(name, uses.get(name, []), catalogue))
-            shown += [(np.full((_KIT_HEIGHT, _KIT_WIDTH, 3), 240, np.uint8), "")] * (SETTINGS - len(shown))
+            shown += [(np.full((_KIT_HEIGHT, _KIT_WIDTH, 3), 240, np.uint8), "")] * (_KIT_SETTINGS - len(shown))
             pictures += [picture for picture, _ in shown]
             labels += [label for _, label in shown]
-        yield f"kit-{module.replace('_', '-')}", contact_sheet(pictures, labels, SETTINGS)
+        yield f"kit-{module.replace('_', '-')}", contact_sheet(pictures, labels, _KIT_SETTINGS)
 
 
 def uses_of(plans: Sequence[Path]) -> dict[str, list[Use]]:
@@ -310,7 +310,7 @@ def _pictures(name: str, uses: Sequence[Use], catalogue: Catalogue) -> Iterator[
         if picture is not None and not any(np.array_equal(picture, other) for other in shown):
             yield picture, label
             shown.append(picture)
-        if len(shown) == SETTINGS:
+        if len(shown) == _KIT_SETTINGS:
             return
 
 

@@ -62,7 +62,7 @@ class SurfaceTexels:
         return out
 
     def colours(self, face: Int32s, points: Floats, texture: _Table = lambda material: material.texture) -> Bytes:
-        """Bytes (n, 3) of points (n, 3) on faces (n,), by the nearest texel of each material's texture."""
+        """Colours (n, 3) of points (n, 3) on faces (n,), by the nearest texel of each material's texture."""
         out = self.mean_colours(face)
         self._sample(out, face, points, texture)
         return self.with_vertex_colours(face, points, out)
