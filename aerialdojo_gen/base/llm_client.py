@@ -165,7 +165,7 @@ class Connection:
 
     def _failure(self, error: Any) -> AerialDojoError:
         if isinstance(error, self._package.APIStatusError):
-            return self._refusal(error.status_code, error)
+            return self._refusal(error)
         cause = error.__cause__ or error
         if isinstance(cause, BodyBoundError):
             return self.unusable(self.clean(str(cause)))
@@ -175,18 +175,21 @@ class Connection:
             return ServiceDown(f"{self.name}: {message}: is the service there, and is base_url right?")
         return AgentUnavailable(f"{self.name}: {message}", kind="connection lost")
 
-    def _refusal(self, status: int, error: Any) -> AerialDojoError:
+    def _refusal(self, error: Any) -> AerialDojoError:
         """Make the error for an HTTP status that is none of success."""
-        body = getattr(error, "body", None)
-        text, after_s = self._line(body or error.message), retry_after_s(error.response.headers)
-        message, words = f"{self.name}: HTTP {status}: {text}", f"{_codes(body)} {text}".lower()
+        status, body = error.status_code, getattr(error, "body", None)
+        text = self._line(body or error.message)
+        message = f"{self.name}: HTTP {status}: {text}"
+        words = f"{_codes(body)} {text}".lower()
+        after_s = retry_after_s(error.response.headers)
+        # No key, money or permission, or a redirect: the key must not go elsewhere.
         if status in (401, 402, 403, 407) or 300 <= status < 400 or _ALL_REQUESTS.search(words):
             return UsageError(message)
         if status in _RETRYABLE or status >= 500:
             return AgentUnavailable(message, after_s, kind=_RETRYABLE.get(status, "server error"))
-        model = rf"(?<!\w){re.escape(self._model.lower())}(?!\w)" if self._model else "model_not_found"
         # A 404 may be the model's or the address's, or that of something in the request.
-        if status == 404 and (re.search(f"{model}|model_not_found", words) or not _PICTURE_WORDS.search(words)):
+        named = self._model and re.search(rf"(?<!\w){re.escape(self._model.lower())}(?!\w)", words)
+        if status == 404 and (named or "model_not_found" in words or not _PICTURE_WORDS.search(words)):
             return UsageError(message)
         if _FILTERED.search(words):
             kind = "content filter"
@@ -310,7 +313,7 @@ def retry_after_s(headers: Mapping[str, str]) -> float | None:
 
 
 _RETRYABLE = {408: "time-out", 409: "conflict", 425: "too early", 429: "rate limit"}
-# A wrong or missing key and no money, as no permission and redirects: the key must not go elsewhere.
+# No money, or a wrong or missing key: no other request will fare better.
 _ALL_REQUESTS = re.compile(
     "insufficient_quota|billing_|credit balance|insufficient credits|insufficient balance|"
     "api key not valid|api_key_invalid|invalid api key|incorrect api key"

@@ -167,11 +167,11 @@ def find_violation(
             why = f"is {item}, no finite number"
         elif kind in (dict, list) and depth >= MAX_DEPTH:
             why = f"is nested more than {MAX_DEPTH} deep"
-        elif kind in (dict, list):
-            pairs = item.items() if kind is dict else enumerate(item)
-            stack += [(inner, (path, key), depth + 1) for key, inner in pairs]
-            wrong = filter(None, (_wrong_text(key, longest) for key in item)) if kind is dict else iter(())
-            why = next((f"has a key that {fault}" for fault in wrong), "")
+        elif kind is list:
+            stack += [(inner, (path, k), depth + 1) for k, inner in enumerate(item)]
+        elif kind is dict:
+            stack += [(inner, (path, key), depth + 1) for key, inner in item.items()]
+            why = next((f"has a key that {wrong}" for key in item if (wrong := _wrong_text(key, longest))), "")
         if why:
             keys = []
             while path is not None:

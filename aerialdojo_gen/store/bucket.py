@@ -263,7 +263,9 @@ class Bucket:
         except (StoreError, FileNotFoundError, Changed):
             raise
         except Exception as error:
-            raise cloud_error(error, url, self.endpoint) or error from error
+            if (translated := cloud_error(error, url, self.endpoint)) is not None:
+                raise translated from error
+            raise
 
 
 # Clients may be shared by threads, sessions that make them may not.
@@ -290,4 +292,6 @@ def _made_client(_process: int) -> Any:
     try:
         return botocore.session.Session().create_client("s3", config=config)
     except Exception as error:
-        raise cloud_error(error, "s3://", endpoint) or error from error
+        if (translated := cloud_error(error, "s3://", endpoint)) is not None:
+            raise translated from error
+        raise

@@ -23,7 +23,7 @@ def sha256_of(path: Path) -> str:
     digest = hashlib.sha256()
     for file in sorted(path.iterdir()) if path.is_dir() else [path]:
         with file.open("rb") as opened:
-            hashlib.file_digest(opened, lambda: digest)
+            hashlib.file_digest(opened, lambda: digest)  # Goes on with the same digest
     return digest.hexdigest()
 
 

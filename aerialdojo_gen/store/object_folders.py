@@ -79,8 +79,9 @@ class State:
         with self._lock:
             for group, (_, objects) in self._listings.items():
                 if key.startswith(group):
-                    objects.pop(key, None)
-                    if entry is not None:
+                    if entry is None:
+                        objects.pop(key, None)
+                    else:
                         objects[key] = entry
 
 

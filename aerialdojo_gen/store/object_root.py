@@ -288,7 +288,7 @@ class _Ranges(io.RawIOBase):
 
 
 def matching(names: Iterable[str], pattern: str) -> set[str]:
-    """Return the names, and the folders that they lie in, that match a glob as `Path.glob` does, by parts."""
+    """Return the names, and the folders that they lie in, that match a glob part by part, or all by ``**/*``."""
     every = {"/".join(parts[:n]) for name in names for parts in [name.split("/")] for n in range(1, len(parts) + 1)}
     if pattern == "**/*":
         return every

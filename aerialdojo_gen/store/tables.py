@@ -1,6 +1,6 @@
 """Tables: made of rows, checked by their schema, identified by their content; and as Parquet files by their path.
 
-No other module reads and writes Parquet.
+No other module reads or writes Parquet.
 """
 
 from __future__ import annotations

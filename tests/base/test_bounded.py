@@ -33,14 +33,17 @@ HOSTILE_TOML = {
     'a = "\\ud800"': "not a Unicode scalar value",
     f'a = "{"x" * 2001}"': "a: has 2,001 characters, the most is 2,000",
     'a = """': "Unterminated string",
+    "a = 2020-13-45": "line 1",
 }
 HOSTILE_JSON = {
     "[" * 50_000: "line 1, column 65: nested more than 64 deep",
+    '{"a":' * 500 + "1" + "}" * 500: "is nested more than 64 deep",
     '{"a":\n [1, ' + "9" * 5000 + "]}": "line 2, column 6: a number of 5,000 digits",
     '{"a": [1, 9223372036854775808]}': "a[1]: is an integer beyond 64 bits",
     '{"a": [NaN]}': "NaN is no finite number",
     '{"a": {"b": -1e999}}': "a.b: is -inf, no finite number",
     '{"a": {"b": "x\\ud800"}}': "a.b: has half a Unicode character",
+    '{"\\udfff": 1}': "has a key that has half a Unicode character",
     '[0, "\\u0000"]': "[1]: has a NUL character",
     '{"a": ': "line 1, column 7: is not JSON",
 }

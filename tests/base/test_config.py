@@ -79,6 +79,7 @@ BASE = "[task]\nbase = {{ min_length_m = {}, max_length_m = {}, action_budget = 
         ("[plan]\ntargets_per_prat = 3\n", r"\[plan\] unknown key 'targets_.*': did you mean 'targets_per_part'"),
         ("[anchor-sampel]\n", "'anchor-sampel': did you mean 'anchor-sample'"),
         ("sed = 1\n[split]\nid_train_fraction = 1.5\n", "id_train_fraction = 1.5.*'sed'"),
+        ("[embodiment]\nradius_m = nan\n", "radius_m = nan"),
     ],
 )
 def test_faults_and_sections_that_contradict_each_other(tmp_path, text, message):

@@ -35,7 +35,7 @@ def measures(found, chosen, radius_m, config):
     for n in range(len(chosen)):
         view = looked.picture(n, config.picture_px)
         terms = judge(view, radius_m, config.standoff_m)
-        off_front_rad = view.known.off_front_rad
+        off_front_rad = view.measures.off_front_rad
         front = None if off_front_rad is None else off_front_rad <= FRONT_RAD
         yield [terms.unoccluded, terms.framed, terms.open, terms.shown, terms.tells, front]
 

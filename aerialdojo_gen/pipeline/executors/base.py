@@ -1,4 +1,7 @@
-"""The interface of executors: tasks in, results out in completion order."""
+"""The interface of executors: tasks in, results out in completion order.
+
+Nothing heavy is imported: every worker process starts with this.
+"""
 
 from __future__ import annotations
 

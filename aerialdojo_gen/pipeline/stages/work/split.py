@@ -55,6 +55,7 @@ def held_out(scene: str, object_ids: Sequence[int], fraction: float, key: bytes)
 
 
 def _hex(text: str, key: bytes, kind: bytes) -> str:
+    """Hash by a key: ids cannot be enumerated without the release's salt."""
     return hashlib.blake2b(text.encode(), digest_size=_DIGEST_BYTES, key=key, person=kind).hexdigest()
 
 
