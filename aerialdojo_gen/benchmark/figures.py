@@ -137,10 +137,10 @@ def family_radars(runs: Sequence[Run], profile: Profile, paper_axes: bool = Fals
 
 
 def _curves(runs: Sequence[Run], profile: Profile, paper_axes: bool) -> tuple[list[_Curve], list[float], str | None]:
-    """Score the families of every run, (4, 5), as shares of the way outwards; where axes end; a note on who lacks."""
+    """Score the families of every run, (4, 5), as shares of the way outwards; where axes end; who is left out."""
     # Without the oracle, which would fix every scale.
     drawn = [(k, run) for k, run in enumerate(runs) if GROUP_OF.get(run.agent) != UPPER_BOUND] or [*enumerate(runs)]
-    most = np.array([math.inf if MEASURES[metric].metres else 100.0 for metric in PAPER_METRICS])
+    in_metres = np.array([MEASURES[metric].metres for metric in PAPER_METRICS])
     found = []
     for _, run in drawn:
         families = summarize(run.episodes, profile).families
@@ -148,11 +148,12 @@ def _curves(runs: Sequence[Run], profile: Profile, paper_axes: bool) -> tuple[li
             [math.nan if family not in families else getattr(families[family], m) for m in PAPER_METRICS]
             for family in _FAMILIES
         ]
-        found.append(np.array(rows) * np.where(np.isinf(most), 1.0, most))
+        found.append(np.array(rows) * np.where(in_metres, 1.0, 100.0))
     if paper_axes:
         ends = [PAPER_ENDS[metric] for metric in PAPER_METRICS]
     else:
-        ends = [*map(axis_end, np.nanmax(np.stack(found), axis=(0, 1)).tolist(), most.tolist())]
+        largest, most = np.nanmax(np.stack(found), axis=(0, 1)), np.where(in_metres, math.inf, 100.0)
+        ends = [*map(axis_end, largest.tolist(), most.tolist())]
     inwards = [metric in _INWARDS for metric in PAPER_METRICS]
     shares = [np.clip(np.where(inwards, 1.0 - own / ends, own / ends), 0.0, 1.0) for own in found]
     curves = [(k, run.label, own) for (k, run), own in zip(drawn, shares, strict=True)]

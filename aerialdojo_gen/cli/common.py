@@ -112,10 +112,10 @@ class StageOptions:
         run_chosen(list(upstream(stage)), config, roots, scenes or self.chosen, how, self.quiet, self.verbose)
 
 
-def stage_command(app: typer.Typer, stage: str) -> Callable[[Callable[..., None]], None]:
+def stage_command(app: typer.Typer, stage: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
     """Register a function as a stage's command, which gets `StageOptions` and options of its own."""
 
-    def register(function: Callable[..., None]) -> None:
+    def register(function: Callable[..., None]) -> Callable[..., None]:
         common = [*inspect.signature(StageOptions, eval_str=True).parameters.values()]
         own = [*inspect.signature(function, eval_str=True).parameters.values()][1:]
 
@@ -126,6 +126,7 @@ def stage_command(app: typer.Typer, stage: str) -> Callable[[Callable[..., None]
         # What Typer reads the options from.
         vars(command)["__signature__"] = inspect.Signature([*common[:-2], *own, *common[-2:]])
         app.command(stage, help=BY_NAME[stage].help)(command)
+        return function
 
     return register
 
@@ -157,7 +158,7 @@ def run_chosen(
 
 
 def print_next(scene: str | None, pipeline: Path, project: Path) -> None:
-    """Say the commands that make tasks in scenes that were added; of one without annotations, first their draft."""
+    """Say which commands make tasks in added scenes; `scene` is one whose annotations are drafted first."""
     if scene is not None:
         print(f"next: {cli_context.command('annotate-draft', scene, pipeline=pipeline)}")
     print(f"then: {cli_context.command('run', pipeline, data=project / 'data')}")

@@ -139,11 +139,12 @@ def export(
         from aerialdojo_gen.exchange.samples import ExportOptions
 
         sensors = Sensors(
-            tuple(view or ("front",)), True, not no_depth, width or height or 128, height or width or 128
+            tuple(view or ("front",)), depth=not no_depth, width=width or height or 128, height=height or width or 128
         )
         request = ExportOptions(
-            tuple(split or ()), tuple(setting or ()), tuple(chosen or ()), limit or 0, seed or 0, sensors,
-            tuple(goal or ("text",)), source or "render", renderer or "auto", jpeg_quality or 0, tuple(run or ()),
+            splits=tuple(split or ()), settings=tuple(setting or ()), scenes=tuple(chosen or ()), limit=limit or 0,
+            seed=seed or 0, sensors=sensors, goal=tuple(goal or ("text",)), source=source or "render",
+            renderer=renderer or "auto", jpeg_quality=jpeg_quality or 0, runs=tuple(run or ()),
         )  # fmt: skip
         if estimate:
             estimated = estimate_for_learning(form, root, request, workers)

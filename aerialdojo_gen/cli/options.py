@@ -65,7 +65,7 @@ def _files(incomplete: str) -> Iterator[str]:
 
 
 def is_typed(ctx: typer.Context, option: Any) -> bool:
-    """Whether an option is from the command line, not from the environment and no default."""
+    """Whether an option is from the command line, rather than from the environment or a default."""
     source = ctx.get_parameter_source(str(option.name))
     return source is not None and source.name == "COMMANDLINE"
 

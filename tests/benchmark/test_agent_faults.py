@@ -98,6 +98,7 @@ SAID = {
     "invalid": r"raised InvalidAnswer in reset.*nothing to answer yet",
     "act": rf"OSError at {FILE}\.py:\d+: disk \(in act\)",
     "float": r"returned 2\.5 \(float\) from act, where an action is expected: a whole number from 0 \(Stop\) to 15;",
+    "none": r"returned None \(NoneType\) from act",
     "far": r"returned 16 \(int\) from act",
     "true": r"returned True \(bool\) from act",
     "array": r"returned array\(\[3, 4\]\) \(ndarray\) from act",

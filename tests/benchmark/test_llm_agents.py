@@ -242,6 +242,7 @@ def test_keys_come_from_the_environment(protocol, monkeypatch):
         ({"model": "m", "modle": "x"}, "unknown key 'modle': did you mean 'model'"),
         ({"model": "m", "temperature": 3}, "temperature"),
         ({"model": "m", "base_url": "ftp://x/v1"}, "base_url.*not a URL"),
+        ({"model": "m", "base_url": "http://[::1/v1"}, "base_url.*not a URL"),
         ({"model": "m", "base_url": "https://user:pw@x/v1"}, "base_url.*keys come from the environment"),
         ({"model": "m", "base_url": "https://x/v1?key=1"}, "base_url.*keys come from the environment"),
     ],

@@ -41,6 +41,7 @@ def test_wrappings_that_are_not_part_of_the_answer_come_off(text):
         ("{}", "action: Field required"),
         ('{"action": 0}', "action: Input should be a valid string"),
         ('{"action": "stop"}', "'stop' is none of the actions"),
+        ('{"action": "Approach"}', "'Approach' is none of the actions"),
         ('{"action": "Stop", "confidence": 1}', "confidence: Extra inputs are not permitted"),
         ('{"action": "Stop", "action": "MoveUp1"}', "duplicate key"),
         ("[" * 10_000, "not one JSON object"),

@@ -80,6 +80,21 @@ def test_one_scene_has_no_deviation_and_one_family_and_an_empty_log_no_score():
     assert (empty.scenes, math.isnan(empty.overall.sr)) == ({}, True)
 
 
+def test_each_rule_sees_a_flight_its_own_way():
+    far = {
+        "final_distance_m": 18.0, "min_distance_m": 16.0, "final_horizontal_distance_m": 13.0,
+        "min_horizontal_distance_m": 13.0,
+    }  # fmt: skip
+    high = far | {"final_distance_m": 25.0, "min_distance_m": 25.0}
+    rows = log({"final_distance_m": 4.5, "min_distance_m": 4.0}, far, far | NO_STOP, far | {"collision": True}, high)
+    assert {name: outcomes(rows, profile).sr.tolist() for name, profile in PROFILES.items()} == {
+        "aerialdojo": [False, False, False, False, False], "aerialdojo-5m": [True, False, False, False, False],
+        "uav-on": [True, True, False, False, False], "aerialvln": [True, True, False, False, True],
+        "openfly": [True, True, True, True, False],
+    }  # fmt: skip
+    assert outcomes(rows, profile_named("openfly")).spl[1] == 9 / 12, "against the straight distance"
+
+
 def test_an_unknown_rule_is_named():
     with pytest.raises(UsageError, match=r"no profile 'uavon': did you mean 'uav-on'"):
         profile_named("uavon")

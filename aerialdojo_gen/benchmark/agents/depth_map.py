@@ -40,7 +40,7 @@ class DepthMap:
         self._barred = np.zeros((n, n), np.uint8)
 
     def cell(self, x_m: Any, y_m: Any) -> tuple[Any, Any]:
-        """Cells of points, kept inside the map."""
+        """Cells of points, of numbers or arrays, kept inside the map."""
         i, j = (np.clip(np.rint(v / _CELL_M).astype(np.int64) + _MIDDLE, 0, 2 * _MIDDLE) for v in (x_m, y_m))
         return i, j
 

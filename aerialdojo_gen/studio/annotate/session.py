@@ -18,7 +18,7 @@ import numpy as np
 from aerialdojo_gen.annotations.check import SourceCheck
 from aerialdojo_gen.annotations.format import Anchor, Annotations, Object, format_annotations, parse_annotations
 from aerialdojo_gen.annotations.phrases import spoken
-from aerialdojo_gen.annotations.relations import SceneGeometry, nearest_landmark
+from aerialdojo_gen.annotations.relations import nearest_landmark
 from aerialdojo_gen.annotations.vocabulary import Vocabulary
 from aerialdojo_gen.base.config.pipeline import Pipeline
 from aerialdojo_gen.base.errors import AerialDojoError, UsageError, disk_error
@@ -283,7 +283,6 @@ class Describer:
 
     def __init__(self, vocabulary: Vocabulary, counts: tuple[int, int] | None) -> None:
         self._scene, self._vocabulary, self._counts = vocabulary.scene, vocabulary, counts
-        self._geometry = SceneGeometry.of(vocabulary.scene)  # caches results
 
     def describe(self, annotations: Annotations) -> dict[str, Any]:
         """Describe all entries: ``landmarks``, ``objects`` (each with its ``faults``) and ``faults`` of the file."""
