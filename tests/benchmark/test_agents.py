@@ -249,7 +249,7 @@ def test_a_release_without_them_says_so(planted):
 
 
 def test_an_agents_list_may_be_another_way_but_not_out_of_the_flight_volume(planted):
-    """Lists of another form are found by the check's own faults, tests/dataset/test_validate_difficulty.py."""
+    """Lists of another form are found by the check's own faults, tests/dataset/test_validate_tables.py."""
     release = release_of(planted.data)
     data = SceneData(planted.scene, release, definitions(), read_tables(release, planted.scene)[0])
     routes, tasks = data["routes"], data["tasks"]
