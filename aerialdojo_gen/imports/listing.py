@@ -23,7 +23,6 @@ _UNITS = ((1.0, "metres"), (0.01, "centimetres"), (0.001, "millimetres"), (0.304
 # Plausible width and height of a scene.
 _WIDE_M, _HIGH_M = (15.0, 5000.0), (1.5, 400.0)
 _SURE = 1.3
-_FLAT = 0.95
 _SHOWN = 12
 
 

@@ -216,7 +216,7 @@ def _build_bridge(
         runs[side] = [net.approach(f, e, _MAX_RAMP_M) for f, e in several]
         room[side] = min(sum(LineString(p).length for _, p in run) for run in runs[side])
     ramp = [min(r, rise / usual, _MAX_RAMP_M) for r in room]
-    axis = _axis(core, runs, ramp, kind)
+    axis = _axis(core, runs, ramp)
     start, end = (axis.project(Point(core.coords[k])) for k in (0, -1))
     at = np.linspace(0.0, axis.length, max(round(axis.length / _STATION_M), 4) + 1)
     climbs = [1e9 if beyond[0] else 0.0, 1e9 if beyond[1] else 0.0]
@@ -272,7 +272,7 @@ def _required_rises(
     return out
 
 
-def _axis(core: LineString, runs: Sequence[Sequence[Any]], ramp: Sequence[float], kind: str) -> LineString:
+def _axis(core: LineString, runs: Sequence[Sequence[Any]], ramp: Sequence[float]) -> LineString:
     """Extend the core by its approaches."""
     points = [tuple(p[:2]) for p in core.coords]
     for side in (0, 1):

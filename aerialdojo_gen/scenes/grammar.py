@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from itertools import accumulate, pairwise
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -152,9 +152,12 @@ def between_gates(
     start: float, end: float, gates: Iterable[tuple[float, float]], least_m: float
 ) -> list[tuple[float, float]]:
     """List the stretches between gates, those longer than `least_m`."""
-    stops = [*sorted(gates), (end, end)]
-    starts = accumulate((high for _, high in stops), max, initial=start)
-    return [(low, high) for low, (high, _) in zip(starts, stops, strict=False) if high - low > least_m]
+    free, at = list[tuple[float, float]](), start
+    for low, high in [*sorted(gates), (end, end)]:
+        if low - at > least_m:
+            free.append((at, low))
+        at = max(at, high)
+    return free
 
 
 class _Taken(NamedTuple):

@@ -117,11 +117,13 @@ def test_a_card_and_a_croissant_that_tell_other_numbers(planted):
     text = machine.read_text()
     assert f"id_train ({rows} rows)" in text
     machine.write_text(text.replace(f"id_train ({rows} rows)", "id_train (7,777 rows)"))
-    report = validate(ValidationOptions(planted.release, pipeline=Pipeline(), use_meshes=False))
-    assert [(f.check, f.part, f.table, f.found) for f in report.faults] == [
+    options = ValidationOptions(planted.release, pipeline=Pipeline(), use_meshes=False)
+    assert [(f.check, f.part, f.table, f.found) for f in validate(options).faults] == [
         ("card_counts", "README.md", "tasks", "7,777 rows told"),
         ("card_counts", "croissant.json", "tasks", "7,777 rows told"),
     ]
+    machine.write_text('{"recordSet": [{"name": "tasks", "description": 7}]}')
+    assert "no record sets" in {fault.found for fault in validate(options).faults}
     machine.write_text("{")
     card.unlink()
     assert check(planted, whole=True, use_meshes=False) == {"card_counts": ["README.md"]}

@@ -200,7 +200,7 @@ def test_a_wall_across_any_one_leg_of_any_route_is_found(planted, world):
     data = scene_data(planted)
     found = {data["routes"].key(f.row): f.found for f in flights.route_collision(data, data["routes"])}
     told = {name: [", ".join(f"{v:.2f}" for v in end) for end in joint] for name, joint in joints.items()}
-    assert found == {name: f"the body touches a surface between ({p}) and ({q}) m" for name, (p, q) in told.items()}
+    assert found == {name: f"the body touches a surface between ({p}) m and ({q}) m" for name, (p, q) in told.items()}
 
 
 def beside_the_anchor(row):

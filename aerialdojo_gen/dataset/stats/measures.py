@@ -1,6 +1,6 @@
 """How hard a release's tasks are, what its splits leave unseen, what its goals show and how its references fly.
 
-A table is a row of measures, taken of groups of rows of the data frames of `aerialdojo_gen.dataset.stats.measures`.
+A table is a row of measures, taken of groups of rows of the data frames that `read_tasks` and `read_goals` make.
 """
 
 from __future__ import annotations

@@ -122,18 +122,17 @@ def card_counts(outcome: Outcome, release: Release, totals: Sequence[SceneCounts
         outcome.fault("no file", "the dataset card", part="README.md")
         return
     # Rows of `tasks` and `routes` by split: the card's table of splits, and the descriptions of record sets.
-    table = re.findall(r"^\| `(\w+)` \| ([\d,]+) \| ([\d,]+) \|", card, re.MULTILINE)
+    table = re.findall(r"^\| `(\w+)` \| (\d[\d,]*) \| (\d[\d,]*) \|", card, re.MULTILINE)
     named = (("README.md", split, pair) for split, *numbers in table for pair in zip(_SPLIT, numbers, strict=True))
     stated = [(file, name, split, n) for file, split, (name, n) in named if split in SUBSETS]
     if machine is not None:
         try:
             described = {one["name"]: one["description"] for one in loads_json(machine)["recordSet"]}
+            for name in _SPLIT:
+                rows = re.findall(r"(\w+) \((\d[\d,]*) rows\)", described.get(name, ""))
+                stated += [("croissant.json", name, split, n) for split, n in rows]
         except (ValueError, KeyError, TypeError):
-            described = {}
             outcome.fault("no record sets", "a Croissant description", part="croissant.json")
-        for name in _SPLIT:
-            rows = re.findall(r"(\w+) \(([\d,]+) rows\)", described.get(name, ""))
-            stated += [("croissant.json", name, split, n) for split, n in rows]
     for file, name, split, n in stated:
         outcome.rows += 1
         found = sum(counts.rows[name, split] for counts in totals)

@@ -93,9 +93,7 @@ def _hit(world: CollisionWorld, legs: Floats, radius: float) -> str:
         hit = (legs[0], legs[0]) if world.sphere_in_collision(legs[0], radius) else None
     else:
         hit = next((leg for leg in pairwise(legs) if world.segment_in_collision(*leg, radius)), None)
-    return (
-        "" if hit is None else "between {} and {} m".format(*(place_text(end, 2).removesuffix(" m") for end in hit))
-    )
+    return "" if hit is None else f"between {place_text(hit[0], 2)} and {place_text(hit[1], 2)}"
 
 
 def _clearance_m(world: CollisionWorld, legs: Floats, cap: float) -> float:

@@ -19,7 +19,6 @@ Ints = NDArray[np.int64]
 
 # Distances of the rings from the edge, metres; the last is within the range of all renderers.
 RINGS_M: Floats = np.array([0.0, 3, 8, 16, 28, 45, 70, 105, 155, 225, 320, 450, 640, 900, 1250, 1650])
-_FAR_M = RINGS_M[-1]
 _FAN = 10  # Sectors of a corner
 # Where the edge's own heights, a road, and the level land end, metres from the edge.
 _BLEND_M, _ROAD_M, _HILLS_M, _ISLANDS_M = 60.0, 300.0, 200.0, 800.0
@@ -120,7 +119,7 @@ def make_land(border: Sequence[Stretch], kind: Kind, top_m: float, noise: Noise)
     z = _welded(_heights(strips, grid, kind, noise))
     vertices = np.concatenate([grid, z[..., None]], axis=-1)
     vertices[:, :, 0] = strips.foot
-    parts = [*_quads(strips, vertices, kind, base, noise), *_inner(strips, vertices), *_walls(strips, vertices, base)]
+    parts = [*_quads(strips, vertices, kind, base, noise), *_inner(strips, vertices), *_walls(vertices, base)]
     parts.append(_end(vertices, top_m, kind))
     corners = np.concatenate([p[0] for p in parts])
     keep = norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])) > 1e-7
@@ -269,7 +268,7 @@ def _inner(strips: _Strips, v: Floats) -> list[_Faces]:
     return out
 
 
-def _walls(strips: _Strips, v: Floats, base: str) -> list[_Faces]:
+def _walls(v: Floats, base: str) -> list[_Faces]:
     """Faces, seen from both sides, where the land on the two sides of a seam does not meet."""
     out = []
     after = np.roll(np.arange(len(v)), -1)

@@ -64,9 +64,9 @@ def _registering(kind: str) -> Callable[[Function], Function]:
     return register
 
 
-site_builder = _registering("site")  # Of ``build(site, *, …)``, which adds structure and things to the site
-ground_builder = _registering("ground")  # Of ``build(site, terrain, *, …)``, which returns another terrain
-part_builder = _registering("parts")  # Of ``build(*, …)``, which returns meshes in the structure's frame
+site_builder = _registering("site")  # For ``build(site, *, …)``, which adds structure and things to the site
+ground_builder = _registering("ground")  # For ``build(site, terrain, *, …)``, which returns another terrain
+part_builder = _registering("parts")  # For ``build(*, …)``, which returns meshes in the structure's frame
 
 
 @cache

@@ -189,7 +189,7 @@ def strew_rocks(
 
 
 def _lobes(points: Iterable[shapely.Point], radius_m: float, seed: int, ragged: float) -> list[shapely.Polygon]:
-    """Make blobs about points, of seeds one after the other."""
+    """Make blobs about points, with consecutive seeds."""
     return [blob(p.x, p.y, radius_m, seed + k, ragged) for k, p in enumerate(points)]
 
 

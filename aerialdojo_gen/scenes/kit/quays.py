@@ -23,8 +23,8 @@ from aerialdojo_gen.scenes.kit.structures import Point, block, columns, letters,
 from aerialdojo_gen.scenes.mesh import Mesh, Parts, merge, posed, rotated, rotation, translated
 from aerialdojo_gen.scenes.placement import Placement
 from aerialdojo_gen.scenes.plans.values import Area, At, Box, Line, Material, Number, Point3, Spacing
-from aerialdojo_gen.scenes.shapes import box, crown, cylinder, sweep
 from aerialdojo_gen.scenes.shapes import box as cuboid
+from aerialdojo_gen.scenes.shapes import crown, cylinder, sweep
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import Terrain, rolling_terrain
 
@@ -52,8 +52,8 @@ def fenders(site: Site, *, edges: list[Line], spacing_m: Number = 7.0) -> None:
             yaw = math.degrees(math.atan2(b.y - a.y, b.x - a.x)) - 90.0
             turn = rotation(0.0, 0.0, yaw)
             if k % 4 == 2:
-                parts = [translated(box(size=(0.08, 0.08, 2.2)), (0.06, v, 0.0)) for v in (-0.25, 0.25)]
-                parts += [translated(box(size=(0.06, 0.5, 0.06)), (0.06, 0.0, 0.2 + 0.35 * j)) for j in range(6)]
+                parts = [translated(cuboid(size=(0.08, 0.08, 2.2)), (0.06, v, 0.0)) for v in (-0.25, 0.25)]
+                parts += [translated(cuboid(size=(0.06, 0.5, 0.06)), (0.06, 0.0, 0.2 + 0.35 * j)) for j in range(6)]
                 rungs.append(posed(merge(parts), turn, (a.x, a.y, 0.0)))
             else:
                 tyre = rotated(cylinder(radius=0.55, height=0.3, segments=10), rotation(0.0, 90.0, 0.0))
@@ -145,9 +145,9 @@ def pier(
     metres from there, where the rails at its sides are open.
     """
     frame, w = Frame(*at, yaw_deg), width_m / 2
-    parts: Parts = [(floor, translated(box(size=(length_m, width_m, 0.14)), (length_m / 2, 0.0, z - 0.14)))]
+    parts: Parts = [(floor, translated(cuboid(size=(length_m, width_m, 0.14)), (length_m / 2, 0.0, z - 0.14)))]
     wood: list[Mesh] = [
-        translated(box(size=(length_m, 0.22, 0.3)), (length_m / 2, v, z - 0.44)) for v in (-w + 0.2, 0.0, w - 0.2)
+        translated(cuboid(size=(length_m, 0.22, 0.3)), (length_m / 2, v, z - 0.44)) for v in (-w + 0.2, 0.0, w - 0.2)
     ]
     count = max(round((length_m - 0.8) / bay_m), 1)
     for k in range(count + 1):
@@ -155,7 +155,7 @@ def pier(
         ground = site.ground_z(*frame.at(u, 0.0))
         foot = min(ground, 0.0) - 1.0
         wood.append(columns([(u, -w + 0.3), (u, w - 0.3)], foot, z - 0.2, 0.17))
-        wood.append(translated(box(size=(0.24, width_m, 0.26)), (u, 0.0, z - 0.68)))
+        wood.append(translated(cuboid(size=(0.24, width_m, 0.26)), (u, 0.0, z - 0.68)))
         if z - ground > 2.4:
             braces = [[(u, s * (w - 0.3), ground + 0.4), (u, -s * (w - 0.3), z - 0.7)] for s in (-1, 1)]
             wood += [sweep(path=brace, radius=0.07, sides=4) for brace in braces]
@@ -182,9 +182,9 @@ def bars(path: Sequence[Point], z_m: float, material: str = "#f1f0ea", height_m:
     bodies: list[Mesh] = []
     for length, turn, middle, spots in rail_legs(path, 2.0):
         for share, thick in ((0.35, 0.04), (0.68, 0.04), (1.0, 0.09)):
-            bar = rotated(box(size=(length, thick, thick)), turn)
+            bar = rotated(cuboid(size=(length, thick, thick)), turn)
             bodies.append(translated(bar, (*middle, z_m + share * height_m - thick)))
-        bodies += [posed(box(size=(0.08, 0.08, height_m)), turn, (*spot, z_m)) for spot in spots]
+        bodies += [posed(cuboid(size=(0.08, 0.08, height_m)), turn, (*spot, z_m)) for spot in spots]
     return [(material, merge(bodies))]
 
 

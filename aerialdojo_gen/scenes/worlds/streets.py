@@ -28,7 +28,8 @@ def street_along(draft: Draft, y: float) -> float:
     draft.take(line.buffer(half, cap_style="flat"))
     for at in np.arange(4.0, line.length - 4.0, 7.5):
         here, there = line.interpolate(at), line.interpolate(at + 0.5)
-        unit = (there.x - here.x) * 2  # Hardly 1, and lanes have their middles at halves of centimetres
+        # 1 but for its last bits, by which the middles of lanes, which lie at half centimetres, are rounded.
+        unit = (there.x - here.x) * 2
         for side, yaw in ((-1, 0.0), (1, 180.0)):
             draft.slot("road", here.x, y + side * unit * _EDGE_LANE_M / 2, yaw, (12.0, 2.9))
             draft.slot("kerb", here.x, y + side * unit * (half - 0.95), side * -90.0, (1.7, 5.0))

@@ -25,7 +25,7 @@ def rolling(draft: Draft, height_m: float, wavelength_m: tuple[float, float] = (
 def patches(
     draft: Draft, role: str, kinds: int, count: int, radius_m: list[float], most: int = 9999, key: str = "patches"
 ) -> None:  # fmt: skip
-    """Paint patches of several materials of a role on the ground, by a seed of at `most`."""
+    """Paint patches of several materials of a role on the ground; their seed is drawn up to `most`."""
     names = [draft.material(role, k) for k in range(kinds)]
     draft.make("paint_patches", materials=names, count=count, radius_m=radius_m, seed=draft.whole(0, most, key))
 
@@ -257,13 +257,12 @@ def houses_about(
     poses: list[Pose] = []
     for _ in range(number * 90):
         x, y = round(float(rng.uniform(-w, w)), 1), round(float(rng.uniform(-d, d)), 1)
-        rng.uniform(0, 360)  # Not used; without it all worlds would be others
+        rng.uniform(0, 360)  # Not used; without this draw every world would change
         spot = shapely.Point(x, y)
-        to = (
-            facing.interpolate(facing.project(spot))
-            if isinstance(facing, shapely.LineString)
-            else shapely.Point(facing)
-        )
+        if isinstance(facing, shapely.LineString):
+            to = facing.interpolate(facing.project(spot))
+        else:
+            to = shapely.Point(facing)
         yaw = towards((x, y), (to.x, to.y)) + float(rng.uniform(-8, 8))
         if to.distance(spot) <= reach_m and len(poses) < number and draft.has_room(x, y, radius_m):
             poses.append((x, y, round(yaw % 360.0, 1)))

@@ -58,7 +58,7 @@ def shallow(draft: Draft, lot: Box, k: int, most_m: float, low: bool) -> Box:
 
 
 def flattened(draft: Draft, box: Box, k: int, name: str, share: float, is_heap: bool) -> None:
-    """Leave a yard on a lot, or a heap of rubble of so large a share of it besides."""
+    """Leave a yard on a lot, with a heap of rubble if asked, its radius a share of the lot's shorter side."""
     if is_heap:
         radius = min(box.width, box.depth) * share
         heap(draft, f"heap_{name}", point(*box.middle), radius, draft.number(1.2, 2.2, "heap", k))

@@ -175,7 +175,7 @@ def _footbridge(draft: Draft, x: float, platforms: Sequence[Box]) -> None:
 
 
 def _town(draft: Draft, box: Box, n: int, toward: float) -> None:
-    """Put up buildings on a strip, the station in the middle, fronts to the tracks in turn, a square about it."""
+    """Put up buildings on a strip, the station in the middle, every other front to the tracks, a square about all."""
     draft.section("Buildings beside the line")
     draft.paint(box.rounded(), draft.material("square", n), rise_m=0.12)
     deep, x, k = min(box.depth - 4.5, 11.0), box.x0 + draft.number(2, 8, "first", n), 0

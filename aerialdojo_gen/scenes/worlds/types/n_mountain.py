@@ -110,10 +110,8 @@ def _paths(draft: Draft, massif: _Massif, landings: Sequence[Point]) -> None:
 def _crags(draft: Draft, area: BaseGeometry) -> None:
     """Pile crags on the flanks."""
     rng, (x0, y0, x1, y1) = draft.rng("crags"), area.bounds
-    inner, ways = (
-        draft.site.grown(-5.0).shape(),
-        [shapely.LineString(line["points"]) for line in draft.lines.values()],
-    )
+    inner = draft.site.grown(-5.0).shape()
+    ways = [shapely.LineString(line["points"]) for line in draft.lines.values()]
     crags: list[dict[str, Any]] = []
     for k in range(160):
         at = point(rng.uniform(x0, x1), rng.uniform(y0, y1))
