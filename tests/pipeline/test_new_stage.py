@@ -27,19 +27,20 @@ def test_a_new_stage_is_a_module_a_schema_and_a_row(project, smoke, tmp_path):
         (tmp_path / folder).symlink_to(project / folder)
     for folder in ("meshes", "scenes"):
         shutil.copytree(smoke / folder, tmp_path / "data" / folder)
-    (package / "pipeline" / "stages" / "work" / "tally.py").write_text(module)
-    replaced(package / "store" / "schemas" / "staged.py", "STAGED = (", f"{schema}\n\nSTAGED = (")
-    replaced(package / "store" / "schemas" / "staged.py", "VERDICTS)", "VERDICTS, TALLIES)")
+    (package / "pipeline" / "stages" / "work" / "count_things.py").write_text(module)
+    staged = package / "store" / "schemas" / "staged.py"
+    names = re.search(r"STAGED = \(([^)]*)\)", staged.read_text())[1]
+    replaced(staged, f"STAGED = ({names})", f"{schema}\n\nSTAGED = ({names}, THING_COUNTS)")
     replaced(package / "pipeline" / "registry.py", "\n)  # fmt: skip", f"\n    {row.strip()},\n)")
 
-    tally = ["tally", "--scene", SCENE, "--data", "data", "--workers", "1", "--pipeline", "pipelines/smoke.toml"]
+    options = f"--scene {SCENE} --data data --workers 1 --pipeline pipelines/smoke.toml".split()
     env = os.environ | {"PYTHONPATH": str(tmp_path), "COLUMNS": "200"}
-    command = [sys.executable, "-m", "aerialdojo_gen.cli", *tally]
+    command = [sys.executable, "-m", "aerialdojo_gen.cli", "count-things", *options]
     done = subprocess.run(command, cwd=tmp_path, env=env, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     # Of the stages before nothing is stale; that the new one follows its own code, test_code_digest tells.
-    assert re.findall(r"(\S+): .* (\d+) of 1 shards computed", done.stderr) == [("tally", "1")]
-    rows = pq.read_table(tmp_path / "data" / "tallies" / SCENE).to_pylist()
+    assert re.findall(r"(\S+): .* (\d+) of 1 shards computed", done.stderr) == [("count-things", "1")]
+    rows = pq.read_table(tmp_path / "data" / "thing_counts" / SCENE).to_pylist()
     (scene,) = pq.read_table(smoke / "scenes" / SCENE).to_pylist()
     assert sum(row["things"] for row in rows) == scene["n_instances"]
     assert len(rows) == scene["n_categories"] == len(Counter(row["category"] for row in rows))

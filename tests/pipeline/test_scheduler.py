@@ -22,9 +22,11 @@ TABLES = {"pair-objects": "pairs", "plan": "plans", "filter": "verdicts"}
 
 
 def test_scenes_wait_for_one_another_before_the_release_and_before_recordings():
-    *own, split, render = STAGES
-    assert (own[-1].name, split.name, render.name) == ("filter", "split", "render")
-    assert group_stages(STAGES) == [own, [split], [render]]
+    split, render = BY_NAME["split"], BY_NAME["render"]
+    own = list(STAGES[: STAGES.index(split)])
+    assert own[-1].name == "filter"
+    first, second, third = group_stages(STAGES)
+    assert (first, second, third[0]) == (own, [split], render)
     assert group_stages(own) == [own]
     # Of the last stage alone a part may be wanted.
     assert group_stages(own, alone=True) == [own[:-1], own[-1:]]
