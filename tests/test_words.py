@@ -36,7 +36,7 @@ BANNED = (
     "map_things", "missing_tells", "names_again", "parse_looks", "parts_there", "put_back", "relation_words",
     "relief_things", "rivals", "scenes_there", "seen_table", "settled_z", "tallies", "tally", "tally_of",
     "telling_m", "tells_difficulty", "tells_of", "things_on", "told_by_image", "true_looks", "understand",
-    "valid_looks", "want_meshes", "worth_joining", "worth_tables",
+    "valid_looks", "want_meshes", "worth_joining", "worth_tables", "Looked", "Roots", "Skins", "remembered",
 )  # fmt: skip
 
 
