@@ -34,12 +34,17 @@ _REPO = re.compile(r"[A-Za-z0-9][\w.-]{0,95}/[A-Za-z0-9][\w.-]{0,95}")
 _REVISION = re.compile(r"[\w.][\w./-]{0,199}")
 
 
+def check_revision(revision: str | None) -> None:
+    """Refuse what cannot be a revision, before anything is read or sent."""
+    if revision is not None and (not _REVISION.fullmatch(revision) or ".." in revision):
+        raise UsageError(f"{brief(revision, 100)!r} is no branch, tag or commit")
+
+
 class Hub:
     """A data set on the Hub."""
 
     def __init__(self, repo: str, verb: str, revision: str | None, *, writes: bool = False) -> None:
-        if revision is not None and (not _REVISION.fullmatch(revision) or ".." in revision):
-            raise UsageError(f"{brief(revision, 100)!r} is no branch, tag or commit")
+        check_revision(revision)
         if not _REPO.fullmatch(repo) or ".." in repo or repo.endswith(".git"):
             raise UsageError(f"{brief(repo, 100)!r} is no data set's name: write USER/NAME")
         self.repo = repo
@@ -183,9 +188,10 @@ def push_to_hub(
     root = open_root(data)
     if not isinstance(root, LocalRoot):
         raise UsageError("push-to-hub sends a folder of this machine: copy the release here and name it with --data")
-    hub = Hub(repo, "push-to-hub", revision, writes=True)
+    check_revision(revision)
     scenes = check_release(root)
     reporter = reporter or Reporter(quiet=True)
+    hub = Hub(repo, "push-to-hub", revision, writes=True)
     from huggingface_hub import CommitOperationAdd, CommitOperationDelete
 
     own = [*_COMPANIONS, *(part_name(key, scene, "") for key in SHARDS for scene in scenes)]
